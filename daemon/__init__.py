@@ -1,0 +1,1 @@
+"""The monitor: bus source, cycle assembly, identification, sinks."""

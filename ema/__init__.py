@@ -1,0 +1,1 @@
+"""Fault identification for electromechanical actuators: the library."""

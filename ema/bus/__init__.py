@@ -1,0 +1,1 @@
+"""Frames on the bus: DBC-derived codec, protection, interface choice."""

@@ -1,0 +1,65 @@
+"""The `ema` command. Subcommands are registered by the programs as entry points of the group `ema.commands`.
+
+Exit status: 0 done; 1 a negative answer or a failed check; 2 wrong use or bad input, told in one line.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import entry_points, version
+from typing import Any, NoReturn
+
+import click
+
+from ema.core.errors import EmaError, NegativeAnswer
+
+
+class _Programs(click.Group):
+    """A group whose commands are loaded only when they are called or listed."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted({entry.name for entry in entry_points(group="ema.commands")})
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        for entry in entry_points(group="ema.commands", name=name):
+            command: Any = entry.load()
+            return command
+        return None
+
+
+@click.group(cls=_Programs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(version("ema-monitor"), prog_name="ema")
+def cli() -> None:
+    """Find faults of an electromechanical flight-control actuator in its motor currents."""
+
+
+def main() -> NoReturn:
+    """Run the command line; every error of use is one line on standard error."""
+    try:
+        status = cli.main(standalone_mode=False, prog_name="ema")
+        sys.exit(status if isinstance(status, int) else 0)
+    except click.exceptions.Exit as stop:
+        sys.exit(stop.exit_code)
+    except click.Abort:
+        _fail("interrupted", 130)
+    except KeyboardInterrupt:
+        _fail("interrupted", 130)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(0)
+    except click.ClickException as error:
+        context = getattr(error, "ctx", None)
+        name = context.command_path if context else "ema"
+        if isinstance(error, click.exceptions.NoArgsIsHelpError):
+            click.echo(error.format_message())
+            sys.exit(2)
+        _fail(f"{error.format_message()} (see '{name} --help')", 2)
+    except NegativeAnswer as error:
+        _fail(str(error), 1)
+    except EmaError as error:
+        _fail(str(error), 2)
+
+
+def _fail(message: str, status: int) -> NoReturn:
+    click.echo("ema: " + " ".join(message.split()), err=True)
+    sys.exit(status)

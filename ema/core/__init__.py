@@ -1,0 +1,1 @@
+"""Units, names, configuration, errors and records: what everything else stands on."""

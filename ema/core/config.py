@@ -1,0 +1,97 @@
+"""Typed YAML configuration: declared once with unit, meaning and range; unknown keys are refused."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from .errors import ConfigError
+
+S = TypeVar("S", bound="Settings")
+
+
+class Settings(BaseModel):
+    """Base of every configuration section: immutable, unknown keys refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """SafeLoader that refuses a key given twice instead of keeping the last one silently."""
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+        if isinstance(node, yaml.MappingNode):
+            seen = set()
+            for key_node, _ in node.value:
+                key = self.construct_object(key_node, deep=True)
+                if isinstance(key, list | dict):
+                    raise yaml.constructor.ConstructorError(None, None, "a key must be plain text", key_node.start_mark)
+                if key in seen:
+                    raise yaml.constructor.ConstructorError(
+                        None, None, f"key {key!r} is given twice", key_node.start_mark
+                    )
+                seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def read_yaml(path: str | Path) -> dict[str, Any]:
+    """Read a YAML mapping; ConfigError names the file and the line."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 text (byte {error.start})") from error
+    try:
+        data = yaml.load(text, Loader=_UniqueKeyLoader)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f", line {mark.line + 1}" if mark else ""
+        raise ConfigError(f"{path}{where}: is not valid YAML ({getattr(error, 'problem', None) or error})") from error
+    if not isinstance(data, dict):
+        raise ConfigError(
+            f"{path}: must be a mapping of keys to values, is {'empty' if data is None else type(data).__name__}"
+        )
+    return data
+
+
+def validate(data: Any, kind: type[S], where: str | Path) -> S:
+    """Check `data` against the settings class `kind`; ConfigError names file, key, value and range."""
+    try:
+        return kind.model_validate(data)
+    except ValidationError as error:
+        raise ConfigError(f"{where}: {_describe(error)}") from error
+
+
+def load(path: str | Path, kind: type[S]) -> S:
+    """Read and check a YAML file."""
+    return validate(read_yaml(path), kind, path)
+
+
+def digest(settings: Settings) -> str:
+    """SHA-256 of the settings' canonical JSON: equal for equal meaning, whatever the file looked like."""
+    text = json.dumps(settings.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _describe(error: ValidationError) -> str:
+    parts = []
+    for e in error.errors()[:3]:
+        key = ".".join(str(part) for part in e["loc"]) or "(top level)"
+        if e["type"] == "extra_forbidden":
+            parts.append(f"key '{key}' is unknown")
+        elif e["type"] == "missing":
+            parts.append(f"key '{key}' is missing")
+        else:
+            value = repr(e.get("input"))
+            value = value if len(value) <= 60 else value[:57] + "..."
+            message = e["msg"].removeprefix("Value error, ")
+            parts.append(f"key '{key}' = {value}: {message[0].lower() + message[1:]}")
+    more = error.error_count() - len(parts)
+    return "; ".join(parts) + (f" (and {more} more)" if more > 0 else "")

@@ -1,0 +1,45 @@
+"""The one nomenclature table: every channel of a record with its unit and meaning.
+
+Mechanical quantities end in `_m`, electrical in `_e`, of the user (control surface) in `_u`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+FAULTS = ("k1", "k2", "k3", "k4", "k5", "k6")
+FAULT_MEANING = {
+    "k1": "dry friction",
+    "k2": "backlash",
+    "k3": "short, phase A",
+    "k4": "short, phase B",
+    "k5": "short, phase C",
+    "k6": "eccentricity",
+}
+PHASES = ("a", "b", "c")
+
+
+class Channel(NamedTuple):
+    """Unit and meaning of one channel."""
+
+    unit: str
+    meaning: str
+
+
+CHANNELS = {
+    "t": Channel("s", "time since the start of the cycle"),
+    "i_a": Channel("A", "phase current A, measured"),
+    "i_b": Channel("A", "phase current B, measured"),
+    "i_c": Channel("A", "phase current C, measured"),
+    "theta_m": Channel("rad", "rotor angle, mechanical"),
+    "theta_u": Channel("rad", "user position, by LVDT"),
+    "theta_cmd": Channel("rad", "commanded user position"),
+    "u_dc": Channel("V", "DC bus voltage"),
+    "temp_w": Channel("°C", "winding temperature"),
+    "i_q": Channel("A", "q-axis (torque) current"),
+    "u_q": Channel("V", "q-axis voltage"),
+    "w_m": Channel("rad/s", "rotor speed, mechanical"),
+    "w_ref": Channel("rad/s", "commanded rotor speed"),
+    "q": Channel("m", "position of a linear axis"),
+    "force": Channel("N", "force on a linear axis"),
+}

@@ -1,0 +1,72 @@
+"""Physical quantities in configuration: a bare number is in the declared unit, a string carries its own.
+
+`pint` is imported only when a string with a unit has to be converted, so that a process fed with bare
+numbers (the daemon) stays small.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    registry: Any = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+    registry.define("@alias degree_Celsius = °C")
+    registry.define("percent_value = 0.01 = %") if "%" not in registry else None
+    return registry
+
+
+def to_unit(value: str, unit: str) -> float:
+    """Convert a text such as ``"0.36 mH"`` to a number in `unit`; ValueError says what would be right."""
+    import pint
+
+    try:
+        quantity = _registry().Quantity(value)
+        return float(quantity.to(unit or "dimensionless").magnitude)
+    except pint.DimensionalityError as error:
+        raise ValueError(f"{value!r} has the wrong unit, expected [{unit or '1'}]") from error
+    except (pint.UndefinedUnitError, pint.PintError, ValueError, TypeError, AssertionError) as error:
+        raise ValueError(f"{value!r} is not a number with a unit of [{unit or '1'}]") from error
+
+
+def convert(from_unit: str, unit: str) -> tuple[float, float]:
+    """Scale and offset that take numbers in `from_unit` to numbers in `unit`: ``y = scale * x + offset``."""
+    if from_unit == unit:
+        return 1.0, 0.0
+    import pint
+
+    try:
+        registry = _registry()
+        zero, one = (
+            float(registry.Quantity(x, from_unit or "dimensionless").to(unit or "dimensionless").magnitude)
+            for x in (0.0, 1.0)
+        )
+    except pint.DimensionalityError as error:
+        raise ValueError(f"[{from_unit}] cannot be converted to [{unit}]") from error
+    except (pint.PintError, ValueError, TypeError, AssertionError) as error:
+        raise ValueError(f"[{from_unit}] is not a known unit, expected one of [{unit}]") from error
+    return one - zero, zero
+
+
+def quantity(unit: str, meaning: str, **bounds: Any) -> Any:
+    """Type of a configuration field: a float in `unit`, with its meaning and its range (ge, gt, le, lt).
+
+    >>> class Motor(Settings):
+    ...     R: quantity("ohm", "phase resistance", gt=0)
+    """
+
+    def parse(value: Any) -> Any:
+        return to_unit(value, unit) if isinstance(value, str) else value
+
+    extra = {"unit": unit}
+    return Annotated[
+        float,
+        BeforeValidator(parse),
+        Field(allow_inf_nan=False, description=f"{meaning} [{unit or '1'}]", json_schema_extra=extra, **bounds),
+    ]

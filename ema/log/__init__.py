@@ -1,0 +1,1 @@
+"""MCAP logs: write, read, recover."""

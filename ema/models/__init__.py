@@ -1,0 +1,1 @@
+"""HF, LF1, LF2 and axis: compositions of effects."""

@@ -1,0 +1,1 @@
+"""POD and sampling schedules."""

@@ -1,0 +1,1 @@
+"""The offline phase: from the HF model to a bundle."""

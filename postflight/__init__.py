@@ -1,0 +1,1 @@
+"""After the flight: replay, report, export, recover, discrepancy."""

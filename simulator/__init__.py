@@ -1,0 +1,1 @@
+"""An HF actuator on the bus."""

@@ -1,0 +1,1 @@
+"""Service units shipped with the project."""
