@@ -1,0 +1,1 @@
+"""Records of measured or simulated cycles: named channels with units."""

@@ -18,7 +18,6 @@ def _registry() -> Any:
 
     registry: Any = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
     registry.define("@alias degree_Celsius = °C")
-    registry.define("percent_value = 0.01 = %") if "%" not in registry else None
     return registry
 
 
@@ -64,7 +63,7 @@ def quantity(unit: str, meaning: str, **bounds: Any) -> Any:
     def parse(value: Any) -> Any:
         return to_unit(value, unit) if isinstance(value, str) else value
 
-    extra = {"unit": unit}
+    extra: dict[str, Any] = {"unit": unit}
     return Annotated[
         float,
         BeforeValidator(parse),
