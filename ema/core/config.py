@@ -30,7 +30,7 @@ class _UniqueKeyLoader(yaml.SafeLoader):
             for key_node, _ in node.value:
                 key = self.construct_object(key_node, deep=True)
                 if isinstance(key, list | dict):
-                    problem = "a key must be plain text"
+                    raise yaml.constructor.ConstructorError(None, None, "a key must be plain text", key_node.start_mark)
                 if key in seen:
                     raise yaml.constructor.ConstructorError(
                         None, None, f"key {key!r} is given twice", key_node.start_mark
