@@ -4,13 +4,17 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test check env bench lock clean
+.PHONY: demo test test-vcan check env bench lock clean
 
 demo: env
 	$(BIN)/ema demo --out demo
 
 test: env
 	$(BIN)/pytest
+
+# On a real vcan0: this kernel's, else User-Mode Linux's (needs tools/install_system_packages).
+test-vcan: env
+	$(BIN)/python tools/on_vcan.py $(BIN)/pytest -m vcan tests/vcan
 
 check: env
 	$(BIN)/ruff check .

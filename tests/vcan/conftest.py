@@ -1,0 +1,101 @@
+"""Everything in this folder needs a real SocketCAN interface `vcan0`: `make test-vcan` gives it one."""
+
+import os
+import socket
+import struct
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+INTERFACE = "vcan0"
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if HERE in item.path.parents:
+            item.add_marker(pytest.mark.vcan)
+
+
+def pytest_terminal_summary(terminalreporter):
+    def count(outcome):
+        reports = terminalreporter.stats.get(outcome, [])
+        return sum("vcan" in getattr(report, "keywords", ()) for report in reports)
+
+    counts = ", ".join(f"{count(outcome)} {outcome}" for outcome in ("passed", "failed", "error", "skipped"))
+    terminalreporter.write_line(f"on a real vcan0: {counts}; kernel {os.uname().release}")
+
+
+@pytest.fixture(autouse=True)
+def vcan0(request):
+    """The interface's name. Without the interface: skipped, but a failure where these tests were asked for by name."""
+    if INTERFACE not in dict(socket.if_nameindex()).values():
+        stop = pytest.fail if request.config.getoption("markexpr") == "vcan" else pytest.skip
+        stop(f"no {INTERFACE} here: use `make test-vcan`")
+    return INTERFACE
+
+
+class RawCan(socket.socket):
+    """A raw CAN FD socket on an interface, written without any code of the project: the tests' own witness."""
+
+    FRAME = struct.Struct("<IBBxx64s")
+    EXTENDED = socket.CAN_EFF_FLAG
+
+    def __init__(self, interface):
+        super().__init__(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        self.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
+        self.bind((interface,))
+        self.settimeout(10)
+
+    def send_frame(self, can_id, data):
+        """Send `data` as a CAN FD frame; `can_id` with the kernel's flag bits (EXTENDED)."""
+        self.send(self.FRAME.pack(can_id, len(data), 0, data))
+
+    def receive_frame(self):
+        """The next CAN FD frame: (can_id, data)."""
+        can_id, length, _flags, data = self.FRAME.unpack(self.recv(self.FRAME.size))
+        return can_id, data[:length]
+
+
+@pytest.fixture
+def raw_can(vcan0):
+    """Opens RawCan sockets on vcan0: `raw_can()`."""
+    opened = []
+
+    def open_one():
+        opened.append(RawCan(vcan0))
+        return opened[-1]
+
+    yield open_one
+    for can in opened:
+        can.close()
+
+
+@pytest.fixture
+def candump(vcan0):
+    """Starts can-utils' candump, waits until it listens: `dump = candump(3)`; `dump()` gives its next 3 log lines."""
+    running = []
+
+    def start(n_frames):
+        words = ["candump", "-L", "-n", str(n_frames), "-T", "30000", vcan0]
+        listeners = _n_listeners()
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        running.append(process)
+        deadline = time.monotonic() + 30
+        while _n_listeners() == listeners:
+            assert process.poll() is None, "candump ended at once"
+            assert time.monotonic() < deadline, "candump did not open its socket"
+            time.sleep(0.02)
+        return lambda: process.communicate(timeout=60)[0].splitlines()
+
+    yield start
+    for process in running:
+        process.kill()
+        process.wait()
+
+
+def _n_listeners():
+    """Raw sockets that receive every frame, as the kernel lists them."""
+    return Path("/proc/net/can/rcvlist_all").read_text().count(" raw")

@@ -1,0 +1,84 @@
+"""Boot User-Mode Linux: a Linux kernel as an ordinary process, without privilege, on a directory of the host."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+KERNEL = "linux.uml"
+
+
+class MachineError(Exception):
+    """The machine cannot be started here, or did not end by itself."""
+
+
+def boot(
+    root: Path, init: Path, work: Path, *, parameters: Mapping[str, str], timeout: float, memory: str = "1G"
+) -> Iterator[str]:
+    """Boot, yield the console's lines as they come, return when the machine has halted.
+
+    Parameters
+    ----------
+    root : directory of the host that is the machine's file system.
+    init : the machine's first process, as a path inside `root`.
+    work : an empty directory for the machine's own files.
+    parameters : given to `init` in its environment.
+    timeout : the machine is killed after this time. [s]
+    memory : the machine's; it is taken from /dev/shm as it is used.
+
+    Raises
+    ------
+    MachineError : no such kernel, or the time is over.
+    """
+    kernel = shutil.which(KERNEL)
+    if kernel is None:
+        raise MachineError(f"{KERNEL} is not installed: run tools/install_system_packages")
+    words = [f"mem={memory}", "root=/dev/root", "rootfstype=hostfs", f"rootflags={root}", "rw", f"init={init}"]
+    words += ["con=null", "con0=null,fd:1", "ssl=null", "quiet", f"uml_dir={work}"]
+    words += [f"{name}={value}" for name, value in parameters.items()]
+    machine = subprocess.Popen(
+        [kernel, *words],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        env={**os.environ, **_wide_registers(work)},
+        text=True,
+        errors="replace",
+        start_new_session=True,  # the guest's processes are the host's: one group to end them all
+    )
+    over = threading.Event()
+
+    def end() -> None:
+        over.set()
+        os.killpg(machine.pid, signal.SIGKILL)
+
+    clock = threading.Timer(timeout, end)
+    clock.start()
+    try:
+        assert machine.stdout
+        for line in machine.stdout:
+            yield line.rstrip("\r\n")
+    finally:
+        clock.cancel()
+        if machine.poll() is None and not over.is_set():
+            os.killpg(machine.pid, signal.SIGKILL)
+        machine.wait()
+    if over.is_set():
+        raise MachineError(f"the machine was still running after {timeout:g} s and was killed")
+
+
+def _wide_registers(work: Path) -> dict[str, str]:
+    """Environment that lets the kernel run on hosts with AMX; see wide_registers.c."""
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        print("no C compiler: on a host with AMX the machine will not boot", file=sys.stderr)
+        return {}
+    library = work / "wide_registers.so"
+    source = HERE / "wide_registers.c"
+    subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
+    return {"LD_PRELOAD": str(library)}
