@@ -1,1 +1,155 @@
-"""Records of measured or simulated cycles: named channels with units."""
+"""Records of measured or simulated cycles: named channels in the units of `ema.core.names`.
+
+>>> record = read_record("flight.csv")
+>>> require(record, ("t", "i_a", "theta_m"), min_samples=100)
+>>> for cycle in record.cycles:
+...     cycle["i_a"]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import RecordError
+from .names import CHANNELS
+
+Array = NDArray[np.float64]
+
+# A reader of another file kind registers itself under its suffix, for example ".mcap".
+READERS_GROUP = "ema.record_readers"
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One cycle: channels of equal length. `label` says where it came from, for messages."""
+
+    number: int
+    channels: Mapping[str, Array]
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        unknown = sorted(set(self.channels) - set(CHANNELS))
+        if unknown:
+            raise RecordError(f"{self}: unknown channel {', '.join(unknown)} (known: {', '.join(CHANNELS)})")
+        lengths = {name: np.shape(values) for name, values in self.channels.items()}
+        if len(set(lengths.values())) > 1 or any(len(shape) != 1 for shape in lengths.values()):
+            raise RecordError(f"{self}: channels must be one-dimensional and of one length, are {lengths}")
+
+    def __str__(self) -> str:
+        return self.label or f"cycle {self.number}"
+
+    def __getitem__(self, name: str) -> Array:
+        try:
+            return self.channels[name]
+        except KeyError:
+            raise RecordError(f"{self}: channel '{name}' [{CHANNELS[name].unit}] is missing") from None
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.channels
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return len(next(iter(self.channels.values()))) if self.channels else 0
+
+    @property
+    def period(self) -> float:
+        """Median time between samples. [s]"""
+        return float(np.median(np.diff(self["t"])))
+
+    def rows(self, start: int, stop: int) -> Cycle:
+        """Part of the cycle, samples `start` to `stop` (excluded)."""
+        return Cycle(self.number, {name: x[start:stop] for name, x in self.channels.items()}, self.label)
+
+
+@dataclass(frozen=True)
+class Record:
+    """Cycles of (possibly) unequal length with the same channels.
+
+    `ignored` names the columns of the file that are not channels; `resolution` the steps of the measurement
+    where they are known [unit of the channel].
+    """
+
+    cycles: tuple[Cycle, ...]
+    source: Path | None = None
+    ignored: tuple[str, ...] = ()
+    resolution: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels that every cycle has."""
+        if not self.cycles:
+            return ()
+        return tuple(name for name in self.cycles[0].channels if all(name in cycle for cycle in self.cycles))
+
+    @property
+    def n_cycles(self) -> int:
+        """Number of cycles."""
+        return len(self.cycles)
+
+    @property
+    def name(self) -> str:
+        """The file's name, for messages."""
+        return str(self.source) if self.source else "record"
+
+    def __iter__(self) -> Iterator[Cycle]:
+        return iter(self.cycles)
+
+
+def read_record(path: str | Path) -> Record:
+    """Read a record: CSV by the contract (with its sidecar), or what a registered reader knows by its suffix.
+
+    Raises
+    ------
+    RecordError
+        One line: what is wrong, in which file and line.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise RecordError(f"{path}: is a directory, not a record")
+    if not path.exists():
+        raise RecordError(f"{path}: no such file")
+    return _reader(path.suffix.lower())(path)
+
+
+def _reader(suffix: str) -> Callable[[Path], Record]:
+    for entry in entry_points(group=READERS_GROUP, name=suffix):
+        reader: Callable[[Path], Record] = entry.load()
+        return reader
+    from .csv_records import read_csv
+
+    return read_csv
+
+
+def require(
+    record: Record,
+    channels: Collection[str],
+    *,
+    min_samples: int = 2,
+    min_cycles: int = 1,
+    varying: Collection[str] = (),
+) -> None:
+    """Raise RecordError if the record lacks channels, cycles, samples, or a channel that must vary is constant."""
+    missing = [name for name in channels if name not in record.channels]
+    if missing:
+        wanted = ", ".join(f"{name} [{CHANNELS[name].unit}]" for name in missing)
+        ignored = f"; columns not understood: {', '.join(record.ignored)}" if record.ignored else ""
+        have = ", ".join(record.channels) or "none"
+        raise RecordError(f"{record.name}: missing channel {wanted} (has {have}{ignored})")
+    if record.n_cycles < min_cycles:
+        raise RecordError(f"{record.name}: {record.n_cycles} cycles, at least {min_cycles} are needed")
+    for cycle in record.cycles:
+        if cycle.n_samples < min_samples:
+            raise RecordError(
+                f"{record.name}: {cycle} has {cycle.n_samples} samples, at least {min_samples} are needed"
+            )
+    for name in varying:
+        if all(np.ptp(cycle[name]) == 0.0 for cycle in record.cycles):
+            value = record.cycles[0][name][0]
+            raise RecordError(f"{record.name}: channel {name} is constant at {value:g} {CHANNELS[name].unit}")
