@@ -1,0 +1,10 @@
+from ema.core.status import Reason
+
+
+def test_reasons_are_named_in_the_order_of_their_bits():
+    assert (Reason.AT_BOUND | Reason.LOST_FRAMES).names == ["lost_frames", "at_bound"]
+    assert Reason(0).names == []
+
+
+def test_reasons_fit_a_sixteen_bit_field():
+    assert sum(Reason) == 0xFFFF
