@@ -1,0 +1,25 @@
+"""Direction-dependent friction: more friction one way than the other (seals, preloaded gears)."""
+
+from __future__ import annotations
+
+from .base import Effect, Parameter
+
+
+def factor(theta_m, w_m, theta_u, direction, tau_load, asymmetry):
+    """F × (1 + a sign ω_m)"""
+    return 1.0 + asymmetry * direction
+
+
+EFFECT = Effect(
+    name="asymmetric_friction",
+    parameters=(
+        Parameter(
+            "asymmetry", "1", 0.0, -0.8, 0.8, 0.1, "half difference of friction between the directions over its mean"
+        ),
+    ),
+    sentence="friction {asymmetry:+.0%} in positive and the opposite in negative direction",
+    separated_by="slow motion in both directions, without load at the user",
+    laws={"static_friction": factor, "sliding_friction": factor},
+    mistaken_for=("k1",),
+    plants=("ema", "axis"),
+)

@@ -1,0 +1,91 @@
+"""What an effect is: one physical term, its parameters, and what an engineer would say of it.
+
+An effect file defines one `EFFECT`. Its laws are pure scalar functions of plain floats, written so that a
+JIT can run them on many lanes at once: no branches but conditional expressions, `vector_math` instead of `math`.
+Each law belongs to a *hook*, the place in the models' equations where it enters; every model calls the same law.
+
+====================  =========================================================  ======================  ========
+hook                  arguments before the parameters                            combined by             neutral
+====================  =========================================================  ======================  ========
+shaft_torque          θ_m [rad], ω_m [rad/s], θ_u [rad], i_q [A]                 sum, opposes motion     0 N m
+static_friction       θ_m, ω_m, θ_u, direction (±1), τ_load [N m]                product on F_s          1
+sliding_friction      θ_m, ω_m, θ_u, direction (±1), τ_load [N m]                product on F_d          1
+user_torque           θ_u [rad]                                                  sum, opposes the user   0 N m
+emf_factor            i_j [A], ΔT [K]                                            product on κ_j          1
+resistance_factor     ΔT [K]                                                     product on R_j          1
+inductance_factor     i_j [A]                                                    product on L_j          1
+angle_error           θ_m [rad]                                                  sum, on the resolver    0 rad
+====================  =========================================================  ======================  ========
+
+ΔT is the winding temperature less 20 °C. An effect without laws is *structural*: the model itself reads its
+parameters (a delay, a dead time, a second inertia).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+HOOKS = MappingProxyType(
+    {
+        "shaft_torque": ("sum", 4),
+        "static_friction": ("product", 5),
+        "sliding_friction": ("product", 5),
+        "user_torque": ("sum", 1),
+        "emf_factor": ("product", 2),
+        "resistance_factor": ("product", 1),
+        "inductance_factor": ("product", 1),
+        "angle_error": ("sum", 1),
+    }
+)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect: `neutral` switches the effect off, `low`..`high` is what is physically credible.
+
+    `start` is where a search begins (never the neutral value where the effect has no slope there).
+    """
+
+    name: str
+    unit: str
+    neutral: float
+    low: float
+    high: float
+    start: float
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One physical term.
+
+    Parameters
+    ----------
+    sentence : str
+        What an engineer would say, with the parameters' names in braces.
+    mistaken_for : tuple of str
+        Faults a monitor without this effect would report.
+    separated_by : str
+        The experiment (motion, temperature, channel) that tells it from its look-alikes.
+    plants : tuple of str
+        Plants in which it has a meaning: ``ema`` (three-phase actuator), ``axis`` (single inertia or mass).
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    sentence: str
+    separated_by: str
+    laws: Mapping[str, Callable[..., float]] = field(default_factory=dict)
+    mistaken_for: tuple[str, ...] = ()
+    plants: tuple[str, ...] = ("ema",)
+
+    def __post_init__(self) -> None:
+        unknown = set(self.laws) - set(HOOKS)
+        if unknown:
+            raise ValueError(f"effect {self.name}: unknown hooks {sorted(unknown)}; known: {sorted(HOOKS)}")
+
+    def neutral(self) -> dict[str, float]:
+        """Values that switch the effect off."""
+        return {p.name: p.neutral for p in self.parameters}

@@ -1,0 +1,20 @@
+"""Gear compliance: the gear train is a spring between the motor and an inertia at the user."""
+
+from __future__ import annotations
+
+from .base import Effect, Parameter
+
+EFFECT = Effect(
+    name="gear_compliance",
+    parameters=(
+        Parameter(
+            "compliance", "rad/(N m)", 0.0, 1e-06, 0.0003, 3e-05, "twist of the gear train per torque at the user"
+        ),
+        Parameter("inertia", "kg m^2", 0.5, 0.05, 3.0, 0.5, "inertia at the user"),
+        Parameter("damping", "1", 0.05, 0.005, 0.5, 0.05, "damping ratio of the resonance"),
+    ),
+    sentence="the gear train gives {compliance:.2g} rad per N m; with {inertia:.2g} kg m² at the user it resonates",
+    separated_by="fast motion with both θ_m and θ_u measured",
+    mistaken_for=("k2",),
+    plants=("ema",),
+)

@@ -1,0 +1,25 @@
+"""Load-dependent friction: gear meshes lose a share of the torque they pass on."""
+
+from __future__ import annotations
+
+from .base import Effect, Parameter
+
+
+def factor(theta_m, w_m, theta_u, direction, tau_load, per_torque):
+    """F × (1 + c |τ_load|)"""
+    return 1.0 + per_torque * abs(tau_load)
+
+
+EFFECT = Effect(
+    name="load_friction",
+    parameters=(
+        Parameter(
+            "per_torque", "1/(N m)", 0.0, 0.0, 20.0, 1.0, "growth of friction per motor torque, over nominal friction"
+        ),
+    ),
+    sentence="friction grows with the torque passed on, by {per_torque:.3g} of nominal per N m",
+    separated_by="motions with different accelerations or loads at the same speed",
+    laws={"static_friction": factor, "sliding_friction": factor},
+    mistaken_for=("k1",),
+    plants=("ema", "axis"),
+)

@@ -1,0 +1,32 @@
+"""Magnet flux: back-EMF and torque constant scale with the magnets' flux, which falls with temperature."""
+
+from __future__ import annotations
+
+from .base import Effect, Parameter
+
+
+def emf_factor(i_j, dT, change, per_kelvin):
+    """κ × (1 + δ + α ΔT)"""
+    return 1.0 + change + per_kelvin * dT
+
+
+EFFECT = Effect(
+    name="magnet_flux",
+    parameters=(
+        Parameter("change", "1", 0.0, -0.3, 0.1, -0.02, "relative change of flux at 20 °C"),
+        Parameter(
+            "per_kelvin",
+            "1/K",
+            0.0,
+            -0.002,
+            0.0005,
+            -0.001,
+            "relative change of flux per kelvin of winding temperature above 20 °C",
+        ),
+    ),
+    sentence="magnet flux changed by {change:+.1%} (and {per_kelvin:+.2%} per K)",
+    separated_by="the same motion at another temperature; voltage at known speed",
+    laws={"emf_factor": emf_factor},
+    mistaken_for=("k3", "k4", "k5"),
+    plants=("ema", "axis"),
+)

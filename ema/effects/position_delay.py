@@ -1,0 +1,14 @@
+"""Delay of the position sensor (demodulator, bus, filter)."""
+
+from __future__ import annotations
+
+from .base import Effect, Parameter
+
+EFFECT = Effect(
+    name="position_delay",
+    parameters=(Parameter("time", "s", 0.0, 0.0, 0.004, 0.0005, "delay of the user position in the control loop"),),
+    sentence="the position reaches the controller {time:.2g} s late",
+    separated_by="a step or fast chirp with the motor angle recorded",
+    mistaken_for=("k1", "k3", "k4", "k5"),
+    plants=("ema",),
+)

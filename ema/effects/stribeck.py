@@ -1,0 +1,27 @@
+"""Stribeck effect: sliding friction falls from a higher value as lubrication builds up with speed."""
+
+from __future__ import annotations
+
+from .base import Effect, Parameter
+from .vector_math import exp_negative
+
+
+def factor(theta_m, w_m, theta_u, direction, tau_load, excess, speed):
+    """F_d × [1 + e exp(-|ω_m| / ω_s)]"""
+    return 1.0 + excess * exp_negative(-abs(w_m) / speed)
+
+
+EFFECT = Effect(
+    name="stribeck",
+    parameters=(
+        Parameter(
+            "excess", "1", 0.0, 0.0, 1.5, 0.3, "sliding friction at zero speed over its value at high speed, less one"
+        ),
+        Parameter("speed", "rad/s", 10.0, 0.5, 80.0, 10.0, "speed over which the excess fades by 1/e"),
+    ),
+    sentence="Stribeck friction: sliding friction {excess:.0%} higher at low speed, fading over {speed:.3g} rad/s",
+    separated_by="slow motion at several constant speeds",
+    laws={"sliding_friction": factor},
+    mistaken_for=("k1",),
+    plants=("ema", "axis"),
+)

@@ -1,0 +1,23 @@
+"""Winding resistance: copper warms, contacts age; hidden by the current control until the voltage limit."""
+
+from __future__ import annotations
+
+from .base import Effect, Parameter
+
+
+def factor(dT, change, per_kelvin):
+    """R × (1 + δ + α ΔT)"""
+    return 1.0 + change + per_kelvin * dT
+
+
+EFFECT = Effect(
+    name="winding_resistance",
+    parameters=(
+        Parameter("change", "1", 0.0, -0.3, 1.0, 0.1, "relative change of resistance at 20 °C"),
+        Parameter("per_kelvin", "1/K", 0.0, 0.0, 0.006, 0.0039, "relative change per kelvin above 20 °C"),
+    ),
+    sentence="winding resistance changed by {change:+.1%} (and {per_kelvin:+.2%} per K)",
+    separated_by="phase voltage at known current, or a motion at the voltage limit",
+    laws={"resistance_factor": factor},
+    plants=("ema", "axis"),
+)
