@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
 from .errors import ConfigError
+from .units import to_unit
 
 S = TypeVar("S", bound="Settings")
 
@@ -19,6 +20,14 @@ class Settings(BaseModel):
     """Base of every configuration section: immutable, unknown keys refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _number_with_unit(cls, value: Any, info: ValidationInfo) -> Any:
+        extra = cls.model_fields[info.field_name or ""].json_schema_extra
+        if isinstance(value, str) and isinstance(extra, dict) and "unit" in extra:
+            return to_unit(value, str(extra["unit"]))
+        return value
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):

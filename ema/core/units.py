@@ -7,9 +7,9 @@ numbers (the daemon) stays small.
 from __future__ import annotations
 
 from functools import cache
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 
 @cache
@@ -23,8 +23,10 @@ def _registry() -> Any:
 
 def to_unit(value: str, unit: str) -> float:
     """Convert a text such as ``"0.36 mH"`` to a number in `unit`; ValueError says what would be right."""
-    import pint
-
+    try:
+        return float(value)  # YAML reads 6.0e4 as text, for want of a sign in its exponent
+    except ValueError:
+        import pint
     try:
         quantity = _registry().Quantity(value)
         return float(quantity.to(unit or "dimensionless").magnitude)
@@ -53,19 +55,18 @@ def convert(from_unit: str, unit: str) -> tuple[float, float]:
     return one - zero, zero
 
 
-def quantity(unit: str, meaning: str, **bounds: Any) -> Any:
-    """Type of a configuration field: a float in `unit`, with its meaning and its range (ge, gt, le, lt).
+def quantity(unit: str, meaning: str, default: Any = ..., **bounds: Any) -> Any:
+    """Declare a configuration field: a number in `unit`, with its meaning and its range (ge, gt, le, lt).
 
     >>> class Motor(Settings):
-    ...     R: quantity("ohm", "phase resistance", gt=0)
+    ...     R: float = quantity("ohm", "phase resistance", gt=0)
+
+    A text such as ``"1065 mohm"`` is converted (by `ema.core.config.Settings`).
     """
-
-    def parse(value: Any) -> Any:
-        return to_unit(value, unit) if isinstance(value, str) else value
-
-    extra: dict[str, Any] = {"unit": unit}
-    return Annotated[
-        float,
-        BeforeValidator(parse),
-        Field(allow_inf_nan=False, description=f"{meaning} [{unit or '1'}]", json_schema_extra=extra, **bounds),
-    ]
+    return Field(
+        default,
+        allow_inf_nan=False,
+        description=f"{meaning} [{unit or '1'}]",
+        json_schema_extra={"unit": unit},
+        **bounds,
+    )

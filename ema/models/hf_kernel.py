@@ -46,7 +46,7 @@ THIRD = TWO_PI / 3.0
 COS_THIRD, SIN_THIRD = -0.5, 0.75**0.5
 TAU_DC_LINK = 1e-3  # [s] capacitor of the DC link: it hides the switching from the source
 
-_jit = njit(fastmath=True, error_model="numpy")
+_jit = njit(fastmath=True, error_model="numpy", forceinline=True)
 
 
 @_jit
@@ -221,7 +221,7 @@ def integrate(z, command, lvdt_noise, out, history, dt, n_substeps, lanes, exten
     command, lvdt_noise : arrays, shape (n_ticks, n_lanes)
         Commanded user position and noise of its measurement at each control tick. [rad]
     out : array, shape (len(OUTPUTS), n_ticks, n_lanes)
-        Filled with the channels at each tick (currents behind the anti-alias stages, positions as the controller reads them).
+        Filled with the channels at each tick: currents behind the anti-alias stages, positions as measured.
     history : array, shape (2, n_ring, n_lanes)
         Ring buffers of measured position and speed, for the delays.
     dt : float

@@ -1,7 +1,7 @@
 """For every hook one function that combines the laws of all effects at that place (see `ema.effects.base`).
 
-The combined functions take the batch array, the lane and the number of lanes, then the hook's own arguments; each law finds
-its parameters in the array. They are plain module globals, so that a kernel that calls them can be cached.
+The combined functions take the batch array, the lane and the number of lanes, then the hook's own arguments; each
+law finds its parameters in the array. They are plain module globals, so that a kernel that calls them can be cached.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ema.effects import HOOKS, registry
 
 from .layout import row
 
-_inline = njit(inline="never", fastmath=True, error_model="numpy")
+_inline = njit(forceinline=True, fastmath=True, error_model="numpy")
 
 
 def _bind(law: Callable[..., float], first: int, n: int) -> Any:

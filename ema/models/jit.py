@@ -23,4 +23,4 @@ def equations_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-numba.config.CACHE_DIR = str(Path(platformdirs.user_cache_dir("ema")) / f"kernels-{equations_digest()}")
+numba.config.CACHE_DIR = str(Path(platformdirs.user_cache_dir("ema")) / f"kernels-{equations_digest()}")  # type: ignore[attr-defined]
