@@ -1,0 +1,95 @@
+"""Which bus: by configuration, or the best one this machine has."""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+from typing import Any
+
+import can
+from pydantic import Field
+
+from ema.core.config import Settings
+from ema.core.errors import BusError
+
+from .port import Port
+from .python_can import PythonCanPort
+
+AUTO = "auto"
+GROUP = "239.74.163.2"  # python-can's own multicast group
+VCAN = "vcan0"
+
+
+class BusSettings(Settings):
+    """Where a program meets the others.
+
+    `interface` is ``auto`` or an interface of python-can (``socketcan``, ``udp_multicast``, ``virtual``, ``pcan`` …);
+    `options` are passed to that interface as they are.
+    """
+
+    interface: str = AUTO
+    channel: str = ""
+    options: dict[str, Any] = Field(default_factory=dict)
+
+
+def parse(text: str) -> BusSettings:
+    """Settings of a command-line word: ``auto``, ``vcan0``, ``socketcan:can1``, ``udp_multicast``, ``virtual:x`` …"""
+    if text == AUTO:
+        return BusSettings()
+    interface, colon, channel = text.partition(":")
+    if colon:
+        return BusSettings(interface=interface, channel=channel)
+    if text in can.interfaces.VALID_INTERFACES:
+        return BusSettings(interface=text)
+    return BusSettings(interface="socketcan", channel=text)
+
+
+def open_bus(settings: BusSettings) -> Port:
+    """Open the bus; its `choice` says what was taken and why. BusError when it cannot be opened."""
+    if settings.interface != AUTO:
+        return _open(settings)
+    refused = []
+    for interface, channel in (("socketcan", VCAN), ("udp_multicast", GROUP), ("virtual", "ema")):
+        try:
+            port = _open(settings.model_copy(update={"interface": interface, "channel": channel}))
+        except BusError as error:
+            refused.append(str(error))
+            continue
+        port.choice = "; ".join([f"bus {port.name} chosen", *refused])
+        return port
+    raise BusError("; ".join(refused))
+
+
+def _open(settings: BusSettings) -> Port:
+    interface, channel = settings.interface, settings.channel or _default_channel(settings.interface)
+    name = f"{interface}:{channel}"
+    options: dict[str, Any] = {"fd": True} if interface != "virtual" else {"protocol": can.CanProtocol.CAN_FD}
+    if interface == "udp_multicast":
+        options["hop_limit"] = 0  # never leaves this machine
+    try:
+        bus = can.Bus(interface=interface, channel=channel, **{**options, **settings.options})
+    except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
+        raise BusError(f"bus {name} cannot be opened ({_why(error)})") from error
+    if interface == "udp_multicast":
+        _keep_on_loopback(bus.fileno(), channel)
+    return PythonCanPort(bus, name)
+
+
+def _default_channel(interface: str) -> str:
+    return {"socketcan": VCAN, "udp_multicast": GROUP, "virtual": "ema"}.get(interface, "")
+
+
+def _why(error: BaseException) -> str:
+    root = error.__cause__ if isinstance(error.__cause__, OSError) else error
+    return (root.strerror or str(root)) if isinstance(root, OSError) else str(root)
+
+
+def _keep_on_loopback(fileno: int, group: str) -> None:
+    """Send and join on the loopback interface; python-can takes the default route's."""
+    loopback = socket.inet_aton("127.0.0.1")
+    with socket.socket(fileno=os.dup(fileno)) as sock:
+        sock.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, loopback)
+        sock.setsockopt(
+            socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, struct.pack("4s4s", socket.inet_aton(group), loopback)
+        )

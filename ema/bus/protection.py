@@ -1,0 +1,131 @@
+"""AUTOSAR E2E Profile 5 on every frame, in and out: who sent it, is it whole, is it the next one?"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+from e2e.p05 import e2e_p05_check, e2e_p05_protect
+
+from ema.core.frames import FRAME_DTYPE, FrameFlag
+
+from . import identifiers
+from .codec import Codec
+from .e2e_state import StreamState
+from .header import N_SEQUENCES, sequence
+from .stream import GOOD, Check, Counts, Stream
+
+__all__ = ["GOOD", "Check", "Counts", "Receiver", "Sender", "Stream", "StreamState"]
+
+_ROW = FRAME_DTYPE.itemsize
+_DATA = FRAME_DTYPE.fields["data"][1]  # type: ignore[index]
+_FORMAT = int(FrameFlag.EXTENDED | FrameFlag.FD)
+_FORMAT_MASK = _FORMAT | int(FrameFlag.REMOTE | FrameFlag.ERROR)
+
+
+class Sender:
+    """Fills the header of outgoing frames: sequence number of their identifier, then the CRC."""
+
+    def __init__(self) -> None:
+        self._next: dict[int, int] = {}
+
+    def next_sequence(self, frame_id: int) -> int:
+        """Sequence number the next frame of this identifier will get."""
+        return self._next.get(frame_id, 0)
+
+    def skip(self, frame_id: int, count: int = 1) -> None:
+        """Leave out sequence numbers, as if frames had been sent and lost."""
+        self._next[frame_id] = (self.next_sequence(frame_id) + count) % N_SEQUENCES
+
+    def protect(self, frames: np.ndarray) -> np.ndarray:
+        """Fill the headers in place, in order; returns `frames`, shape (n,), dtype FRAME_DTYPE, contiguous."""
+        raw = frames.view(np.uint8).data
+        rows = zip(frames["id"].tolist(), frames["length"].tolist(), strict=True)
+        for start, (frame_id, length) in enumerate(rows):
+            begin = start * _ROW + _DATA
+            number = self.next_sequence(frame_id)
+            self._next[frame_id] = (number + 1) % N_SEQUENCES
+            raw[begin + 2] = number & 0xFF
+            raw[begin + 3] = number >> 8
+            data_id = identifiers.data_id(frame_id)
+            e2e_p05_protect(raw[begin : begin + length], data_id, increment_counter=False)
+        return frames
+
+
+class Receiver:
+    """Checks incoming frames, one stream for each identifier.
+
+    Parameters
+    ----------
+    codec : Codec
+    messages : names
+        What is received; frames of other messages are foreign. All by default.
+    actuators : numbers
+        Whose frames are received. All by default.
+    """
+
+    def __init__(self, codec: Codec, messages: Collection[str] | None = None, actuators: Collection[int] | None = None):
+        self._codec = codec
+        self._messages = codec.messages.keys() if messages is None else set(messages)
+        self._actuators = range(identifiers.N_ACTUATORS) if actuators is None else set(actuators)
+        self._n_foreign = 0
+        self.streams: dict[int, Stream] = {}  # by identifier
+
+    def check(self, frames: np.ndarray) -> np.ndarray:
+        """Judge a batch of frames.
+
+        Parameters
+        ----------
+        frames : array, shape (n,), dtype FRAME_DTYPE
+
+        Returns
+        -------
+        checks : array of uint8, shape (n,)
+            Check values; data are good where ``checks <= GOOD``.
+        """
+        frames = np.ascontiguousarray(frames)
+        raw = frames.view(np.uint8).data
+        checks = bytearray(frames.size)
+        streams = self.streams
+        columns = (frames["id"], frames["flags"] & _FORMAT_MASK, frames["length"], sequence(frames), frames["t_ns"])
+        begin = _DATA - _ROW
+        for n, (frame_id, form, length, number, t_ns) in enumerate(
+            zip(*(column.tolist() for column in columns), strict=True)
+        ):
+            begin += _ROW
+            stream = streams.get(frame_id) or self._open(frame_id)
+            if stream is None:
+                self._n_foreign += 1
+                checks[n] = Check.FOREIGN
+            elif length != stream.length or form != _FORMAT:
+                checks[n] = stream.refuse(Check.WRONG_LENGTH)
+            elif not e2e_p05_check(raw[begin : begin + length], stream.data_id):
+                checks[n] = stream.refuse(Check.CRC_ERROR)
+            elif number == stream.expected and stream.steady:  # the usual case: nothing but the next frame
+                stream.expected = (number + 1) % N_SEQUENCES
+                stream.counts.n_good += 1
+                stream.last_ns = t_ns
+            else:
+                check = checks[n] = stream.place(number)
+                if check <= GOOD:
+                    stream.last_ns = t_ns
+        return np.frombuffer(checks, np.uint8)
+
+    def time_outs(self, now_ns: int) -> list[int]:
+        """Identifiers whose stream had a frame due and did not get it by `now_ns`."""
+        return [frame_id for frame_id, stream in self.streams.items() if stream.time_out(now_ns)]
+
+    @property
+    def counts(self) -> Counts:
+        """What happened, over all streams."""
+        return sum((stream.counts for stream in self.streams.values()), Counts(n_foreign=self._n_foreign))
+
+    def _open(self, frame_id: int) -> Stream | None:
+        message = self._codec.find(frame_id)
+        if message is None or message.name not in self._messages:
+            return None
+        if identifiers.actuator(frame_id) not in self._actuators:
+            return None
+        stream = Stream(identifiers.data_id(frame_id), message.length, round(message.timeout * 1e9))
+        self.streams[frame_id] = stream
+        return stream

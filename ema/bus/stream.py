@@ -1,0 +1,125 @@
+"""One stream: the frames of one message of one actuator, in the order of their sequence numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from enum import IntEnum
+
+from .e2e_state import Result, StateMachine
+from .header import N_SEQUENCES, ahead
+
+MAX_AHEAD = 64  # frames that may be lost in a row without the stream being taken for another one
+MAX_MISSING = 256  # how many lost frames are remembered, to tell a late frame from a repeated one
+
+
+class Check(IntEnum):
+    """What the protection says of one frame. Up to REORDERED its data are good."""
+
+    OK = 0
+    SOME_LOST = 1  # good, frames before it are missing
+    REORDERED = 2  # good, but late: it was missing
+    REPEATED = 3  # seen before
+    WRONG_COUNTER = 4  # far off the sequence
+    CRC_ERROR = 5
+    WRONG_LENGTH = 6  # length or format is not that of the DBC
+    FOREIGN = 7  # no message of this receiver
+
+
+GOOD = Check.REORDERED  # checks up to this one carry data
+
+
+@dataclass(slots=True)
+class Counts:
+    """What happened to frames, each kind by itself."""
+
+    n_good: int = 0  # frames whose data were used, late ones included
+    n_lost: int = 0  # missing from their sequence and not come late
+    n_reordered: int = 0
+    n_repeated: int = 0
+    n_wrong_counter: int = 0
+    n_crc_error: int = 0
+    n_wrong_length: int = 0
+    n_timeout: int = 0
+    n_foreign: int = 0
+
+    def __add__(self, other: Counts) -> Counts:
+        return Counts(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+
+
+@dataclass(slots=True)
+class Stream:
+    """Sequence tracking and E2E state of one identifier.
+
+    A frame up to MAX_AHEAD ahead of the last one is taken as the next with losses between; one behind is late if
+    it was missing, else repeated. One farther off is refused, so that a stray frame cannot pull the sequence
+    away; if the frame after it continues from there, the sender has restarted and the stream follows it.
+    """
+
+    data_id: int
+    length: int
+    timeout_ns: int
+    machine: StateMachine = field(default_factory=StateMachine)
+    counts: Counts = field(default_factory=Counts)
+    expected: int = -1  # next sequence number; -1 before the first frame
+    steady: bool = False
+    last_ns: int = 0
+    _stray: int = -1
+    _missing: dict[int, None] = field(default_factory=dict)  # lost sequence numbers, oldest first
+
+    def refuse(self, check: Check) -> Check:
+        """Count a frame whose length or CRC is wrong."""
+        if check is Check.CRC_ERROR:
+            self.counts.n_crc_error += 1
+        else:
+            self.counts.n_wrong_length += 1
+        self._update(Result.ERROR)
+        return check
+
+    def place(self, sequence: int) -> Check:
+        """Judge a frame with correct CRC by its sequence number."""
+        check = self._judge(sequence)
+        self._update(Result.OK if check <= GOOD else Result.OTHER)
+        return check
+
+    def time_out(self, now_ns: int) -> bool:
+        """Whether nothing came in time; counts it, once for each time-out that passes."""
+        if not self.timeout_ns or now_ns - self.last_ns <= self.timeout_ns:
+            return False
+        self.last_ns = now_ns
+        self.counts.n_timeout += 1
+        self.machine.time_out()
+        self.steady = False
+        return True
+
+    def _judge(self, sequence: int) -> Check:
+        counts = self.counts
+        distance = 0 if self.expected < 0 else ahead(sequence, self.expected)
+        if -MAX_AHEAD <= distance < 0:
+            if sequence in self._missing:
+                del self._missing[sequence]
+                counts.n_lost -= 1
+                counts.n_reordered += 1
+                counts.n_good += 1
+                return Check.REORDERED
+            counts.n_repeated += 1
+            return Check.REPEATED
+        if not 0 <= distance <= MAX_AHEAD:
+            if not 0 < ahead(sequence, self._stray) <= MAX_AHEAD or self._stray < 0:
+                self._stray = sequence
+                counts.n_wrong_counter += 1
+                return Check.WRONG_COUNTER
+            self._missing.clear()
+            distance = 0
+        for lost in range(sequence - distance, sequence):
+            self._missing[lost % N_SEQUENCES] = None
+        while len(self._missing) > MAX_MISSING:
+            del self._missing[next(iter(self._missing))]
+        self.expected = (sequence + 1) % N_SEQUENCES
+        self._stray = -1
+        counts.n_lost += distance
+        counts.n_good += 1
+        return Check.SOME_LOST if distance else Check.OK
+
+    def _update(self, result: Result) -> None:
+        self.machine.update(result)
+        self.steady = self.machine.steady

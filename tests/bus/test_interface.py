@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+
+from ema.bus import interface
+from ema.bus.interface import BusSettings, open_bus, parse
+from ema.core.errors import BusError
+
+
+@pytest.mark.parametrize(
+    ("text", "settings"),
+    [
+        ("auto", BusSettings()),
+        ("vcan0", BusSettings(interface="socketcan", channel="vcan0")),
+        ("socketcan:can1", BusSettings(interface="socketcan", channel="can1")),
+        ("udp_multicast", BusSettings(interface="udp_multicast")),
+        ("virtual:x", BusSettings(interface="virtual", channel="x")),
+    ],
+)
+def test_a_word_on_the_command_line_names_a_bus(text, settings):
+    assert parse(text) == settings
+
+
+@pytest.mark.parametrize("word", ["virtual:test", "udp_multicast:239.74.163.99"])
+def test_frames_cross_a_bus_unchanged(word, currents):
+    sent = currents(50)
+    with open_bus(parse(word)) as here, open_bus(parse(word)) as there:
+        assert here.write(sent) == 50
+        received = there.read(1.0)
+        while received.size < 50:
+            more = there.read(1.0)
+            assert more.size
+            received = np.concatenate([received, more])
+        for name in ("id", "flags", "length", "data"):
+            assert np.array_equal(received[name], sent[name])
+        assert (np.diff(received["t_ns"].astype(np.int64)) >= 0).all()
+        assert here.counters.n_sent == there.counters.n_received == 50
+        assert there.read(0.0).size == 0
+
+
+@pytest.mark.parametrize("word", ["nowhere:x", "socketcan:there-is-no-such-interface", "udp_multicast:10.0.0.1"])
+def test_a_bus_that_cannot_be_opened_is_one_line(word):
+    with pytest.raises(BusError, match="cannot be opened"):
+        open_bus(parse(word))
+
+
+def test_auto_takes_the_next_best_and_says_why(monkeypatch):
+    monkeypatch.setattr(interface, "VCAN", "no-such-vcan")
+    monkeypatch.setattr(interface, "GROUP", "10.0.0.1")
+    with open_bus(parse("auto")) as port:
+        assert port.choice.startswith("bus virtual:ema chosen; bus socketcan:no-such-vcan cannot be opened (")
+        assert "udp_multicast:10.0.0.1" in port.choice

@@ -1,0 +1,167 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from ema.bus import header
+from ema.bus.codec import default
+from ema.bus.protection import GOOD, Check, Receiver, Sender, StreamState
+from ema.bus.stream import MAX_AHEAD, MAX_MISSING
+from ema.core import frames as fr
+
+OK, LOST, LATE, AGAIN = Check.OK, Check.SOME_LOST, Check.REORDERED, Check.REPEATED
+
+
+@pytest.fixture
+def sent(currents):
+    return Sender().protect(currents(400))
+
+
+def checks_of(codec, frames):
+    receiver = Receiver(codec)
+    return receiver.check(frames).tolist(), receiver
+
+
+def test_an_undisturbed_stream_is_good_and_valid(codec, sent):
+    checks, receiver = checks_of(codec, sent)
+    assert checks == [OK] * 400
+    (stream,) = receiver.streams.values()
+    assert stream.machine.state is StreamState.VALID
+    assert receiver.counts.n_good == 400
+
+
+@pytest.mark.parametrize(
+    ("order", "expected", "counted"),
+    [
+        ([0, 1, 4, 5], [OK, OK, LOST, OK], {"n_lost": 2, "n_good": 4}),
+        ([0, 1, 1, 2, 0], [OK, OK, AGAIN, OK, AGAIN], {"n_repeated": 2, "n_good": 3}),
+        ([0, 2, 1, 3], [OK, LOST, LATE, OK], {"n_reordered": 1, "n_lost": 0, "n_good": 4}),
+        ([0, 3, 1, 1, 4], [OK, LOST, LATE, AGAIN, OK], {"n_reordered": 1, "n_lost": 1, "n_repeated": 1}),
+        ([0, 300, 1, 2], [OK, Check.WRONG_COUNTER, OK, OK], {"n_wrong_counter": 1, "n_lost": 0, "n_good": 3}),
+        ([0, 300, 301, 302], [OK, Check.WRONG_COUNTER, OK, OK], {"n_wrong_counter": 1, "n_good": 3}),
+        ([200, 201, 0, 1, 2], [OK, OK, Check.WRONG_COUNTER, OK, OK], {"n_wrong_counter": 1}),
+    ],
+    ids=["lost", "repeated", "reordered", "late twice", "stray", "sender jumped", "sender restarted"],
+)
+def test_the_sequence_tells_what_happened(codec, sent, order, expected, counted):
+    checks, receiver = checks_of(codec, sent[order])
+    assert checks == expected
+    for name, value in counted.items():
+        assert getattr(receiver.counts, name) == value
+
+
+def test_batch_boundaries_do_not_matter(codec, sent):
+    rng = np.random.default_rng(5)
+    order = np.sort(rng.choice(400, 350, replace=False))
+    order[50], order[51] = order[51], order[50]
+    frames = sent[order]
+    frames["data"][rng.choice(350, 9), 20] ^= 1
+    whole, receiver = checks_of(codec, frames)
+    pieces = Receiver(codec)
+    assert np.concatenate([pieces.check(part) for part in np.array_split(frames, 23)]).tolist() == whole
+    assert pieces.counts == receiver.counts
+
+
+@pytest.mark.parametrize("byte", range(64))
+def test_any_damaged_byte_is_found(codec, sent, byte):
+    sent[5]["data"][byte] ^= 1 << byte % 8
+    checks, receiver = checks_of(codec, sent[:20])
+    assert checks[5] == Check.CRC_ERROR
+    assert receiver.counts.n_crc_error == 1
+    assert receiver.counts.n_lost == 1
+
+
+def test_a_frame_of_another_actuator_does_not_pass_as_this_ones(codec, sent):
+    """Masquerading: the Data ID is part of the CRC."""
+    sent["id"] += 4
+    checks, _ = checks_of(codec, sent[:3])
+    assert checks == [Check.CRC_ERROR] * 3
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("length", 63),
+        ("length", 0),
+        ("flags", int(fr.FrameFlag.EXTENDED)),
+        ("flags", int(fr.FrameFlag.FD)),
+        ("flags", int(fr.FrameFlag.EXTENDED | fr.FrameFlag.REMOTE)),
+    ],
+)
+def test_wrong_length_or_format_has_its_own_count(codec, sent, field, value):
+    sent[3][field] = value
+    checks, receiver = checks_of(codec, sent[:5])
+    assert checks[3] == Check.WRONG_LENGTH
+    assert (receiver.counts.n_wrong_length, receiver.counts.n_crc_error) == (1, 0)
+
+
+def test_only_the_wanted_messages_and_actuators_are_received(codec, sent):
+    assert Receiver(codec, messages=["Supply"]).check(sent[:2]).tolist() == [Check.FOREIGN] * 2
+    assert Receiver(codec, actuators=[4]).check(sent[:2]).tolist() == [Check.FOREIGN] * 2
+    assert Receiver(codec, actuators=[3]).check(sent[:2]).tolist() == [OK] * 2
+
+
+def test_sequences_wrap(codec, currents):
+    sender = Sender()
+    frames = currents(100)
+    sender.skip(int(frames["id"][0]), 65500)
+    sender.protect(frames)
+    assert header.sequence(frames)[[0, 35, 36, 99]].tolist() == [65500, 65535, 0, 63]
+    order = [*range(36), 37, 36, *range(38, 100)]
+    checks, _ = checks_of(codec, frames[order])
+    assert checks == [*[OK] * 36, LOST, LATE, *[OK] * 62]
+
+
+def test_errors_make_a_stream_invalid_and_good_frames_valid_again(codec, sent):
+    sent["data"][20:24, 30] ^= 0xFF
+    receiver = Receiver(codec)
+    states = []
+    for n in range(60):
+        receiver.check(sent[n : n + 1])
+        (stream,) = receiver.streams.values()
+        states.append(stream.machine.state)
+    assert states[0] is StreamState.INIT
+    assert states[19] is StreamState.VALID
+    assert states[23] is StreamState.INVALID
+    assert states[59] is StreamState.VALID
+
+
+def test_a_stream_that_stops_times_out_once_for_each_time_out(codec):
+    receiver = Receiver(codec)
+    frames = Sender().protect(codec.encode("Supply", 0, {"u_dc": [48.0] * 5, "temp_w": 20.0}, np.arange(5) * 10**8))
+    receiver.check(frames)
+    (stream,) = receiver.streams.values()
+    assert stream.machine.state is StreamState.VALID
+    assert receiver.time_outs(8 * 10**8) == []
+    assert receiver.time_outs(10 * 10**8) == [int(frames["id"][0])]
+    assert receiver.time_outs(11 * 10**8) == []
+    assert stream.machine.state is StreamState.NO_DATA
+    assert receiver.counts.n_timeout == 1
+
+
+def test_a_long_loss_is_bounded_in_memory(codec, sent):
+    receiver = Receiver(codec)
+    receiver.check(sent[:: MAX_AHEAD + 1])
+    receiver.check(Sender().protect(sent.copy())[::MAX_AHEAD])
+    (stream,) = receiver.streams.values()
+    assert len(stream._missing) <= MAX_MISSING
+
+
+ANY_FRAMES = hnp.arrays(fr.FRAME_DTYPE, st.integers(0, 40))
+
+
+@given(ANY_FRAMES, st.data())
+def test_arbitrary_frames_never_break_the_receiver(frames, data):
+    codec = default()
+    ids = [m.frame_id for m in codec.messages.values()]
+    for frame in frames:
+        if data.draw(st.booleans()):
+            frame["id"] = data.draw(st.sampled_from(ids))
+            frame["flags"] = 9
+    receiver = Receiver(codec)
+    checks = receiver.check(frames)
+    assert checks.size == frames.size
+    assert len(receiver.streams) <= len(ids) * 64
+    for message, part in codec.split(frames[checks <= GOOD]):
+        message.decode(part)
