@@ -55,3 +55,4 @@ class LogState(IntEnum):
     OK = 0
     FULL = 1  # no room: nothing is written until there is
     FAILED = 2  # the device refuses writes for another reason
+    OFF = 3  # none configured

@@ -10,7 +10,7 @@ import pytest
 from ema.bus import identifiers
 from ema.bus.header import HEADER_SIGNALS
 from ema.core import resources
-from ema.core.status import Reason, Status
+from ema.core.status import LogState, Reason, ServiceState, Status
 
 
 @pytest.fixture(scope="module")
@@ -58,11 +58,24 @@ def test_identifiers_are_those_of_actuator_0_with_a_data_id_of_their_own(databas
     assert len(data_ids) == len(database.messages)
 
 
+def choices(message, signal):
+    return {int(k): str(v) for k, v in message.get_signal_by_name(signal).choices.items()}
+
+
+def meaning(enum):
+    return {member.value: member.name.lower() for member in enum}
+
+
+def test_heartbeat_states_are_those_of_the_library(database):
+    heartbeat = database.get_message_by_name("Heartbeat")
+    assert choices(heartbeat, "state") == meaning(ServiceState)
+    assert choices(heartbeat, "log_state") == meaning(LogState)
+
+
 def test_status_and_reasons_are_those_of_the_library(database):
     for name in ("EstimateLinear", "EstimateLf2", "EstimateHf"):
         message = database.get_message_by_name(name)
-        choices = message.get_signal_by_name("status").choices
-        assert {int(k): str(v) for k, v in choices.items()} == {s.value: s.name.lower() for s in Status}
+        assert choices(message, "status") == meaning(Status)
         listed = message.get_signal_by_name("reason").comment.split(": ")[1].rstrip(".")
         assert listed.split(", ") == [reason.name for reason in Reason]
         assert [reason.value for reason in Reason] == [1 << n for n in range(len(Reason))]
