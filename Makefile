@@ -1,10 +1,11 @@
 # `make demo` and `make test` do everything themselves; `make check` is what CI runs before the tests.
 PYTHON ?= python3
+SERVICE_PYTHON ?= /usr/bin/python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test test-vcan check env bench lock clean
+.PHONY: demo test test-vcan wheel install uninstall check env bench lock clean
 
 demo: env
 	$(BIN)/ema demo --out demo
@@ -34,10 +35,24 @@ $(STAMP): requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
 
+# The service: its own virtual environment, units, network and sysctl files; DESTDIR=, PREFIX=, see tools/install_service.
+wheel: env
+	rm -rf build dist
+	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+
+install: wheel
+	PYTHON=$(SERVICE_PYTHON) tools/install_service install dist/*.whl
+
+uninstall:
+	tools/install_service uninstall
+
 # Locked versions for all Pythons and platforms, with hashes (needs `uv`).
+# requirements-run.lock is the installed service's: the same versions without the tools.
+COMPILE := uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links --quiet \
+  --custom-compile-command "make lock"
 lock:
-	uv pip compile --universal --python-version 3.11 --group dev --generate-hashes --no-emit-index-url --no-emit-find-links --quiet \
-	  --custom-compile-command "make lock" pyproject.toml -o requirements.lock
+	$(COMPILE) --group dev pyproject.toml -o requirements.lock
+	$(COMPILE) --constraint requirements.lock pyproject.toml -o requirements-run.lock
 
 clean:
-	rm -rf $(VENV) build *.egg-info
+	rm -rf $(VENV) build dist *.egg-info

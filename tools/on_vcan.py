@@ -16,7 +16,7 @@ import tempfile
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "uml"))
-from machine import HERE, MachineError, boot
+from machine import HERE, MachineError, boot, directory
 
 OUTPUT_BEGINS, OUTPUT_ENDS = "EMA-OUTPUT-BEGINS", "EMA-OUTPUT-ENDS"
 NATIVE = ["unshare", *([] if os.geteuid() == 0 else ["--map-root-user"]), "--net", "sh", "-c"]
@@ -71,7 +71,7 @@ def run_in_uml(command: list[str], timeout: float) -> int:
         lines += [f"cd {shlex.quote(os.getcwd())}", f"exec {shlex.join(command)}"]
         (job / "command.sh").write_text("\n".join(lines) + "\n")
         around, inside = [], False
-        for line in boot(Path("/"), HERE / "init_host.sh", job, parameters={"EMA_JOB": name}, timeout=timeout):
+        for line in boot(directory(Path("/")), HERE / "init_host.sh", job, timeout=timeout):
             if line in (OUTPUT_BEGINS, OUTPUT_ENDS):
                 inside = line == OUTPUT_BEGINS
             elif inside:

@@ -1,4 +1,4 @@
-"""Boot User-Mode Linux: a Linux kernel as an ordinary process, without privilege, on a directory of the host."""
+"""Boot User-Mode Linux: a Linux kernel as an ordinary process, without privilege."""
 
 import os
 import shutil
@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -17,17 +17,24 @@ class MachineError(Exception):
     """The machine cannot be started here, or did not end by itself."""
 
 
-def boot(
-    root: Path, init: Path, work: Path, *, parameters: Mapping[str, str], timeout: float, memory: str = "1G"
-) -> Iterator[str]:
+def directory(path: Path) -> list[str]:
+    """Kernel words for a directory of the host as the machine's root."""
+    return ["root=/dev/root", "rootfstype=hostfs", f"rootflags={path}", "rw"]
+
+
+def image(path: Path, changes: Path) -> list[str]:
+    """Kernel words for a disk image as the machine's root; what the machine writes goes to the file `changes`."""
+    return [f"ubd0={changes},{path}", "root=/dev/ubda", "rw"]
+
+
+def boot(root: list[str], init: Path, job: Path, *, timeout: float, memory: str = "1G") -> Iterator[str]:
     """Boot, yield the console's lines as they come, return when the machine has halted.
 
     Parameters
     ----------
-    root : directory of the host that is the machine's file system.
-    init : the machine's first process, as a path inside `root`.
-    work : an empty directory for the machine's own files.
-    parameters : given to `init` in its environment.
+    root : from `directory` or `image`.
+    init : the machine's first process, as a path inside its root.
+    job : directory of the host; the machine finds its path as EMA_JOB on the kernel's command line.
     timeout : the machine is killed after this time. [s]
     memory : the machine's; it is taken from /dev/shm as it is used.
 
@@ -38,15 +45,14 @@ def boot(
     kernel = shutil.which(KERNEL)
     if kernel is None:
         raise MachineError(f"{KERNEL} is not installed: run tools/install_system_packages")
-    words = [f"mem={memory}", "root=/dev/root", "rootfstype=hostfs", f"rootflags={root}", "rw", f"init={init}"]
-    words += ["con=null", "con0=null,fd:1", "ssl=null", "quiet", f"uml_dir={work}"]
-    words += [f"{name}={value}" for name, value in parameters.items()]
+    words = [f"mem={memory}", *root, f"init={init}", f"EMA_JOB={job}"]
+    words += ["con=null", "con0=null,fd:1", "ssl=null", "quiet", f"uml_dir={job}"]
     machine = subprocess.Popen(
         [kernel, *words],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
-        env={**os.environ, **_wide_registers(work)},
+        env={**os.environ, **_wide_registers(job)},
         text=True,
         errors="replace",
         start_new_session=True,  # the guest's processes are the host's: one group to end them all
@@ -72,13 +78,13 @@ def boot(
         raise MachineError(f"the machine was still running after {timeout:g} s and was killed")
 
 
-def _wide_registers(work: Path) -> dict[str, str]:
+def _wide_registers(job: Path) -> dict[str, str]:
     """Environment that lets the kernel run on hosts with AMX; see wide_registers.c."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
         print("no C compiler: on a host with AMX the machine will not boot", file=sys.stderr)
         return {}
-    library = work / "wide_registers.so"
+    library = job / "wide_registers.so"
     source = HERE / "wide_registers.c"
     subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
     return {"LD_PRELOAD": str(library)}

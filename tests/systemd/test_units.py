@@ -1,0 +1,69 @@
+"""The service files as files; what they do on a running systemd is in test_machine.py."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ema.core import resources
+
+ROOT = Path(__file__).resolve().parents[2]
+UNITS = ["ema-daemon@.service"]
+MOST_EXPOSURE = 1.2
+NEWER_THAN_DEBIAN_12 = ("RestartSteps", "RestartMaxDelaySec")  # systemd 254; older ones warn and go on
+
+needs_systemd_analyze = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")
+
+
+@needs_systemd_analyze
+@pytest.mark.parametrize("unit", UNITS)
+def test_exposure(unit, capsys):
+    words = ["systemd-analyze", "security", "--offline=true", "--no-pager", resources.systemd(unit)]
+    answer = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    (overall,) = [line for line in answer.splitlines() if "Overall exposure" in line]
+    exposure = float(overall.partition(": ")[2].split()[0])
+    with capsys.disabled():
+        print(f"\n{unit}: exposure {exposure}")
+    assert exposure <= MOST_EXPOSURE
+    details = json.loads(subprocess.run([*words, "--json=short"], capture_output=True, check=True).stdout)
+    assert details, "systemd-analyze judged nothing"
+
+
+@needs_systemd_analyze
+@pytest.mark.parametrize("unit", UNITS)
+def test_unit_is_understood(unit, tmp_path):
+    text = resources.systemd(unit).read_text()
+    program = next(line for line in text.splitlines() if line.startswith("ExecStart="))
+    instance = tmp_path / unit.replace("@.", "@vcan0.")
+    instance.write_text(text.replace(program, "ExecStart=/bin/true"))
+    answer = subprocess.run(["systemd-analyze", "verify", instance], capture_output=True, text=True, check=False).stderr
+    complaints = [line for line in answer.splitlines() if instance.name in line]
+    assert [line for line in complaints if not any(key in line for key in NEWER_THAN_DEBIAN_12)] == []
+
+
+@pytest.mark.slow
+def test_install_and_uninstall_below_destdir(tmp_path):
+    stage, wheels = tmp_path / "stage", tmp_path / "wheels"
+    pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
+    copy = tmp_path / "source"  # setuptools builds inside the source tree
+    shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".*", "build", "dist", "*.egg-info", "out", "var"))
+    subprocess.run([*pip, "--wheel-dir", wheels, copy], check=True)
+    (wheel,) = wheels.iterdir()
+    environment = {**os.environ, "DESTDIR": str(stage), "PYTHON": sys.executable}
+    install = ROOT / "tools/install_service"
+    subprocess.run([install, "install", wheel, "--no-deps"], env=environment, check=True, stdout=subprocess.DEVNULL)
+    assert (stage / "usr/local/bin/ema").is_symlink()
+    unit = (stage / "usr/local/lib/systemd/system/ema-daemon@.service").read_text()
+    assert unit == resources.systemd("ema-daemon@.service").read_text()
+    assert {path.name for path in resources.systemd("").iterdir() if path.suffix not in (".py", "")} <= {
+        path.name for path in (stage / "usr/local/lib").rglob("*") if path.is_file()
+    }
+    program = (stage / "opt/ema-monitor/bin/ema").read_text()
+    assert program.startswith("#!/opt/ema-monitor/bin/python")
+    assert str(stage) not in program
+    subprocess.run([install, "uninstall"], env=environment, check=True, stdout=subprocess.DEVNULL)
+    assert [path for path in stage.rglob("*") if not path.is_dir()] == []
