@@ -1,0 +1,165 @@
+"""Logs read back: several segments as one, a time range, memory constant in the length of the log."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from ema.core.errors import LogError
+
+from . import batches, schemas
+from .scan import Damage, McapFile
+
+Paths = str | Path | Iterable[str | Path]
+
+
+def _not_frames(topic: str) -> bool:
+    return topic != schemas.FRAMES.topic
+
+
+class Message(NamedTuple):
+    """One message of a log."""
+
+    topic: str
+    t_ns: int
+    content: dict[str, Any]
+
+
+class FrameBatch(NamedTuple):
+    """Frames of one bus, shape (n,), FRAME_DTYPE."""
+
+    bus: str
+    frames: np.ndarray
+
+
+class LogReader:
+    """Reads MCAP logs, unfinished and damaged ones included.
+
+    Parameters
+    ----------
+    paths : path or paths
+        Files or directories of files; read in the order of their first messages.
+    start_ns, end_ns : int, optional
+        Only what happened in [start_ns, end_ns). [ns since the Unix epoch]
+
+    Attributes
+    ----------
+    damage : list of Damage
+        What could not be read so far (the first thousand); grows while reading.
+
+    Raises
+    ------
+    LogError
+        A file is missing, unreadable or not MCAP.
+    """
+
+    def __init__(
+        self, paths: str | Path | Iterable[str | Path], start_ns: int | None = None, end_ns: int | None = None
+    ):
+        self.damage: list[Damage] = []
+        self.start_ns, self.end_ns = start_ns, end_ns
+        self._files: list[McapFile] = []
+        try:
+            for path in find_logs(paths, (".mcap",)):
+                self._files.append(McapFile(path, self._note))
+            self._files.sort(key=lambda file: (file.first_time() or 0, file.path.name))
+        except LogError:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close all files."""
+        for file in self._files:
+            file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def paths(self) -> list[Path]:
+        """The files in the order they are read."""
+        return [file.path for file in self._files]
+
+    @property
+    def unfinished(self) -> list[Path]:
+        """Files that were not closed properly."""
+        return [file.path for file in self._files if not file.finished]
+
+    def messages(
+        self, wanted: Callable[[str], bool] = lambda topic: topic != schemas.FRAMES.topic
+    ) -> Iterator[Message]:
+        """Messages on the wanted topics (default: all but the raw frames), in the order they were written."""
+        for file in self._files:
+            for raw in file.messages(wanted, self.start_ns, self.end_ns):
+                try:
+                    content = json.loads(raw.data)
+                except (ValueError, RecursionError):
+                    content = None
+                if isinstance(content, dict):
+                    yield Message(raw.topic, raw.t_ns, content)
+                else:
+                    self._note(Damage(file.path, 0, f"a message on {raw.topic} is not JSON"))
+
+    def frames(self) -> Iterator[FrameBatch]:
+        """Raw frames in the order they were written."""
+        low, high = self.start_ns or 0, self.end_ns if self.end_ns is not None else 2**63 - 1
+        early = max(0, low - batches.MAX_SPAN_NS)  # a batch is stored at the time of its first frame
+        whole = self.start_ns is None and self.end_ns is None
+        for file in self._files:
+            for raw in file.messages(lambda topic: topic == schemas.FRAMES.topic, early, high + batches.MAX_SPAN_NS):
+                try:
+                    content = json.loads(raw.data)
+                    frames = batches.unpack(content)
+                    bus = str(content.get("bus", ""))
+                except (ValueError, AttributeError, RecursionError):
+                    self._note(Damage(file.path, 0, "a batch of frames is damaged"))
+                    continue
+                if not whole:
+                    frames = frames[(frames["t_ns"] >= low) & (frames["t_ns"] < high)]
+                if len(frames):
+                    yield FrameBatch(bus, frames)
+
+    def attachments(self) -> dict[str, bytes]:
+        """Attached files by name; of one that several segments hold, the first segment's."""
+        found: dict[str, bytes] = {}
+        for file in self._files:
+            for attachment in file.attachments():
+                found.setdefault(attachment.name, attachment.data)
+        return found
+
+    def metadata(self) -> dict[str, str]:
+        """Key-value pairs of the first segment."""
+        return self._files[0].metadata() if self._files else {}
+
+    def _note(self, damage: Damage) -> None:
+        if len(self.damage) < 1000 and damage not in self.damage:
+            self.damage.append(damage)
+
+
+def find_logs(paths: Paths, suffixes: tuple[str, ...]) -> list[Path]:
+    """Files named, and files with one of the suffixes in directories named; LogError when there is none."""
+    given = [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
+    found: list[Path] = []
+    for path in given:
+        if path.is_dir():
+            inside = sorted(child for child in path.iterdir() if child.suffix.lower() in suffixes)
+            if not inside:
+                raise LogError(f"{path}: holds no log ({', '.join(suffixes)})")
+            found += inside
+        elif path.exists():
+            found.append(path)
+        else:
+            raise LogError(f"{path}: does not exist")
+    if not found:
+        raise LogError("no log given")
+    return list(dict.fromkeys(found))

@@ -1,0 +1,202 @@
+"""A log of segments in a directory: cut by size and time, flushed in time, pruned, and patient with a full disk.
+
+Synchronous and without a clock of its own: the caller hands in the time. `writer.LogWriter` runs it in a thread.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from ema.core.errors import LogError
+from ema.core.status import LogState
+
+from . import retention, schemas
+from .batches import Batcher
+from .schemas import Encoded
+from .segment import Segment
+from .settings import LogSettings
+
+_MB = 1_000_000
+_PENDING_LIMIT = 8 * _MB  # committed before the flush interval is over
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_logger = logging.getLogger("ema.log")
+
+
+class SegmentedLog:
+    """Writes messages to segments `PREFIX-TIME-NUMBER.mcap` of a directory.
+
+    While the device refuses writes, what was accepted before is kept and written later, new messages are dropped and
+    counted, and every flush interval a new attempt is made.
+
+    Parameters
+    ----------
+    directory : Path
+        Must exist and be writable.
+    attachments : mapping of name to bytes
+        Stored in every segment.
+    settings : LogSettings
+    t_ns, clock : int, float
+        Wall-clock time, for names and messages [ns], and monotonic time, for intervals [s].
+    free_space : callable
+        Free space of a directory. [B]
+
+    Raises
+    ------
+    LogError
+        The directory is missing or cannot be written.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        attachments: Mapping[str, bytes],
+        settings: LogSettings,
+        t_ns: int,
+        clock: float,
+        *,
+        prefix: str = "ema",
+        metadata: Mapping[str, str] | None = None,
+        free_space: Callable[[Path], int] = retention.free_space,
+    ):
+        self.state = LogState.OK
+        self.dropped = 0
+        self.directory, self.settings = directory, settings
+        self._prefix, self._attachments, self._metadata = prefix, dict(attachments), dict(metadata or {})
+        self._free_space = free_space
+        self._batchers: dict[str, Batcher] = {}
+        self._segment: Segment | None = None
+        self._number = 0
+        self._opened_at = self._flushed_at = self._troubled_at = clock
+        self._dropped_before = 0
+        if not directory.is_dir():
+            raise LogError(f"log directory {directory} does not exist: create it, or name another one")
+        try:
+            self._open(t_ns, clock)
+        except OSError as error:
+            if error.errno not in _NO_ROOM:
+                raise LogError(f"log directory {directory} cannot be written ({error.strerror})") from error
+            self._trouble(error, clock)
+
+    @property
+    def path(self) -> Path | None:
+        """The segment being written."""
+        return self._segment.path if self._segment else None
+
+    @property
+    def free_bytes(self) -> int:
+        """Free space of the directory's file system, 0 when it cannot be asked. [B]"""
+        try:
+            return self._free_space(self.directory)
+        except OSError:
+            return 0
+
+    def write(self, message: Encoded) -> None:
+        """Accept one message, or drop and count it while the device refuses writes."""
+        if self._segment is None or self.state is not LogState.OK:
+            self.dropped += 1
+            return
+        self._segment.add(message)
+
+    def frames(self, batch: np.ndarray, bus: str) -> None:
+        """Accept frames of one bus, shape (n,), FRAME_DTYPE."""
+        if self._segment is None or self.state is not LogState.OK:
+            self.dropped += len(batch)
+            return
+        batcher = self._batchers.setdefault(bus, Batcher(bus))
+        for content in batcher.add(batch):
+            self.write(schemas.FRAMES.encode(content, content["first_ns"]))
+
+    def tick(self, t_ns: int, clock: float) -> None:
+        """Flush, rotate, prune and retry as far as due: at half the interval, so that the writing fits into it."""
+        pending = self._segment.pending if self._segment else 0
+        if clock - self._flushed_at < self.settings.flush_interval / 2 and pending < _PENDING_LIMIT:
+            return
+        self._flushed_at = clock
+        try:
+            self._flush(t_ns, clock)
+        except OSError as error:
+            self._trouble(error, clock)
+        else:
+            if self.state is not LogState.OK:
+                self._recovered(t_ns, clock)
+
+    def close(self) -> None:
+        """Finish the current segment. LogError when the device does not take it; the file is readable all the same."""
+        segment, self._segment = self._segment, None
+        if segment is None:
+            return
+        try:
+            if self.state is LogState.OK:
+                self._collect_frames(segment)
+            segment.finish()
+        except OSError as error:
+            segment.abandon()
+            raise LogError(f"{segment.path}: could not be finished ({error.strerror})") from error
+
+    def _flush(self, t_ns: int, clock: float) -> None:
+        keep_free = int(self.settings.keep_free * _MB)
+        segment = self._segment
+        if segment is not None and not segment.path.exists():
+            _logger.warning("segment %s was deleted under the log", segment.path)
+            self._drop_segment()
+        for path in retention.prune(
+            self.directory, self._prefix, self.path, self.settings.keep_segments, keep_free, self._free_space
+        ):
+            _logger.info("deleted old segment %s", path)
+        if self._free_space(self.directory) < keep_free:
+            raise OSError(errno.ENOSPC, f"less than {self.settings.keep_free:g} MB left")
+        if self._segment is not None:
+            if self.state is LogState.OK:
+                self._collect_frames(self._segment)
+            self._segment.commit()
+            if self._is_due(self._segment, clock):
+                self._segment.finish()
+                self._segment = None
+        if self._segment is None:
+            self._open(t_ns, clock)
+
+    def _is_due(self, segment: Segment, clock: float) -> bool:
+        aged = clock - self._opened_at >= self.settings.segment_time
+        return segment.finishing or aged or segment.size >= self.settings.segment_size * _MB
+
+    def _open(self, t_ns: int, clock: float) -> None:
+        self._number += 1
+        moment = datetime.fromtimestamp(t_ns / 1e9, UTC)
+        name = f"{self._prefix}-{moment:%Y%m%dT%H%M%S}{moment.microsecond // 1000:03d}Z-{self._number:04d}.mcap"
+        metadata = {**self._metadata, "segment": str(self._number)}
+        self._segment = Segment(self.directory / name, t_ns, self._attachments, metadata)
+        self._opened_at = clock
+
+    def _collect_frames(self, segment: Segment) -> None:
+        for batcher in self._batchers.values():
+            for content in batcher.flush():
+                segment.add(schemas.FRAMES.encode(content, content["first_ns"]))
+
+    def _trouble(self, error: OSError, clock: float) -> None:
+        state = LogState.FULL if error.errno in _NO_ROOM else LogState.FAILED
+        if self.state is LogState.OK:
+            self._troubled_at, self._dropped_before = clock, self.dropped
+        if self.state is not state:
+            _logger.error("log in %s stopped: %s; trying again until it works", self.directory, error.strerror)
+        self.state = state
+        if state is LogState.FAILED and self._segment is not None:
+            self._drop_segment()
+
+    def _drop_segment(self) -> None:
+        if self._segment is not None:
+            self._segment.abandon()
+        self._segment = None
+
+    def _recovered(self, t_ns: int, clock: float) -> None:
+        was, self.state = self.state, LogState.OK
+        lost = self.dropped - self._dropped_before
+        text = f"log was {was.name.lower()} for {clock - self._troubled_at:.1f} s, {lost} frames and messages dropped"
+        _logger.warning("%s", text)
+        event = {"t_ns": t_ns, "level": "warning", "code": "log_resumed", "text": text, "actuator": None}
+        self.write(schemas.EVENT.encode(event))
