@@ -1,1 +1,1 @@
-"""POD and sampling schedules."""
+"""POD of the snapshots and sampling schedules: which instants of a cycle are worth keeping."""
