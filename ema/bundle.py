@@ -1,0 +1,181 @@
+"""What the builder hands the daemon: a folder of numpy arrays (no pickle) and a manifest with their hashes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from dataclasses import dataclass, fields
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ema.core.config import digest, validate
+from ema.core.errors import BundleError
+from ema.core.names import FAULTS
+from ema.identification.noise import NoiseModel
+from ema.models.actuator import Actuator
+from ema.models.lf2 import Lf2
+
+FORMAT = "ema-bundle"
+VERSION = 1
+_LF2 = tuple(field.name for field in fields(Lf2) if field.name != "i0")
+_SHAPES = {
+    "i0": ("n_t",), "v1": ("n_t",), "eigenvalue_share": ("r",), "schedule": ("n_omega",), "A": ("n_omega", 6),
+    "A_full": ("n_t", 6), "A_step": (6,), "Q": ("n_omega", 6), "R": (6, 6),
+    "noise_switching": ("n_omega", "n_omega"), "noise_start": ("n_omega", "n_omega"), "start_B": ("n_omega", 2),
+    "start_scale": (2,), "model_error_linear": ("n_omega", "n_omega"), "model_error_lf2": ("n_omega", "n_omega"),
+    "noise_rms": ("n_t",),
+    "i_SF": ("n_t",), "i_PH": (3, "n_t"), "f1": ("n_f1",), "f2": ("n_f2",), "k2_levels": ("n_k2",), "i_BLK": ("n_k2", "n_t"),
+    "k6_levels": ("n_k6",), "i_zeta": ("n_k6", "n_t"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """An offline phase's result. `arrays` by name; those used most are properties."""
+
+    path: Path
+    manifest: dict[str, Any]
+    arrays: dict[str, np.ndarray]
+
+    @cached_property
+    def plant(self) -> Actuator:
+        """The actuator the bundle was built for."""
+        return validate(self.manifest["plant"], Actuator, self.path / "manifest.json")
+
+    @property
+    def t(self) -> np.ndarray:
+        """Sample times of a cycle, shape (n_t,). [s]"""
+        return self.plant.time()
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate. [Hz]"""
+        return self.plant.control.rate
+
+    @property
+    def schedule(self) -> np.ndarray:
+        """Sample indices kept of each cycle, shape (n_omega,)."""
+        return self.arrays["schedule"]
+
+    @property
+    def i0(self) -> np.ndarray:
+        """Nominal envelope, shape (n_t,). [A]"""
+        return self.arrays["i0"]
+
+    @property
+    def A(self) -> np.ndarray:
+        """Jacobian at the schedule, shape (n_omega, 6). [A]"""
+        return self.arrays["A"]
+
+    def lf2(self) -> Lf2:
+        """The LF2 library over the whole cycle."""
+        return Lf2(i0=self.i0, **{name: self.arrays[name] for name in _LF2})
+
+    def noise(self, method: str) -> NoiseModel:
+        """Noise model at the schedule for the identifier `method`."""
+        a = self.arrays
+        name = f"model_error_{method}"
+        error = a[name] if name in a else np.zeros_like(a["noise_switching"])
+        return NoiseModel(a["noise_switching"], a["noise_start"], a["start_B"], a["start_scale"], error)
+
+
+def save(path: Path, plant: Actuator, builder: dict[str, Any], arrays: dict[str, np.ndarray], **facts: Any) -> Bundle:
+    """Write a bundle whole or not at all; refuses to replace anything that is not a bundle."""
+    path = Path(path)
+    if path.exists() and not (path / "manifest.json").exists() and (not path.is_dir() or any(path.iterdir())):
+        raise BundleError(f"{path}: exists and is not a bundle; choose another --out or remove it")
+    scratch = path.with_name(path.name + ".unfinished")
+    shutil.rmtree(scratch, ignore_errors=True)
+    try:
+        scratch.mkdir(parents=True)
+        entries = {}
+        for name, array in sorted(arrays.items()):
+            np.save(scratch / f"{name}.npy", np.ascontiguousarray(array), allow_pickle=False)
+            entries[name] = {
+                "sha256": _sha256(scratch / f"{name}.npy"),
+                "shape": list(array.shape),
+                "dtype": str(array.dtype),
+            }
+        manifest = {
+            "format": FORMAT, "version": VERSION, "software": version("ema-monitor"), "order_of_k": list(FAULTS),
+            "plant": plant.model_dump(mode="json"), "plant_hash": digest(plant), "builder": builder, **facts, "arrays": entries,
+        }  # fmt: skip
+        (scratch / "manifest.json").write_text(
+            json.dumps(manifest, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
+        if path.exists():
+            shutil.rmtree(path)
+        os.replace(scratch, path)
+    except OSError as error:
+        raise BundleError(f"{path}: cannot be written ({error.strerror})") from error
+    return Bundle(path, manifest, arrays)
+
+
+def load(path: str | Path) -> Bundle:
+    """Read a bundle and check it: format, version, order of k, hashes, shapes, finite numbers."""
+    path = Path(path)
+    manifest_path = path / "manifest.json"
+    try:
+        manifest = json.loads(manifest_path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise BundleError(f"{path}: is not a bundle (no manifest.json); make one with 'ema build'") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise BundleError(f"{manifest_path}: is damaged ({error})") from error
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
+        raise BundleError(f"{manifest_path}: is not the manifest of an actuator bundle")
+    if manifest.get("version") != VERSION:
+        raise BundleError(
+            f"{manifest_path}: bundle version {manifest.get('version')!r}, this software reads {VERSION}; build it again"
+        )
+    if manifest.get("order_of_k") != list(FAULTS):
+        raise BundleError(f"{manifest_path}: order of k {manifest.get('order_of_k')} is not {list(FAULTS)}")
+    entries = manifest.get("arrays")
+    if not isinstance(entries, dict) or not set(_SHAPES) <= set(entries):
+        missing = sorted(set(_SHAPES) - set(entries or {}))
+        raise BundleError(f"{manifest_path}: lists no array '{missing[0] if missing else 'arrays'}'")
+    arrays = {name: _array(path, name, entry) for name, entry in entries.items()}
+    bundle = Bundle(path, manifest, arrays)
+    _check(bundle)
+    return bundle
+
+
+def _array(path: Path, name: str, entry: Any) -> np.ndarray:
+    file = path / f"{name}.npy"
+    if Path(name).name != name or not isinstance(entry, dict):
+        raise BundleError(f"{path / 'manifest.json'}: array entry '{name[:40]}' is damaged")
+    try:
+        if _sha256(file) != entry.get("sha256"):
+            raise BundleError(f"{file}: is damaged (SHA-256 differs from the manifest's)")
+        array: np.ndarray = np.load(file, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise BundleError(f"{file}: cannot be read ({error})") from error
+    return array
+
+
+def _check(bundle: Bundle) -> None:
+    size: dict[str, int] = {"n_t": bundle.plant.n_samples}
+    for name, shape in _SHAPES.items():
+        array = bundle.arrays[name]
+        if array.ndim != len(shape) or array.dtype.kind not in "fi":
+            raise BundleError(f"{bundle.path / name}.npy: must be numbers of {len(shape)} dimensions")
+        for have, want in zip(array.shape, shape, strict=True):
+            expected = want if isinstance(want, int) else size.setdefault(want, have)
+            if have != expected:
+                raise BundleError(f"{bundle.path / name}.npy: shape {array.shape} does not fit ({want} = {expected})")
+        if not np.isfinite(array).all():
+            raise BundleError(f"{bundle.path / name}.npy: holds numbers that are not finite")
+    if digest(bundle.plant) != bundle.manifest.get("plant_hash"):
+        raise BundleError(f"{bundle.path / 'manifest.json'}: the plant does not match its hash")
+    s = bundle.schedule
+    if s.dtype.kind != "i" or (np.diff(s) <= 0).any() or s[0] < 0 or s[-1] >= size["n_t"]:
+        raise BundleError(f"{bundle.path / 'schedule.npy'}: sample indices must increase within 0…{size['n_t'] - 1}")
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

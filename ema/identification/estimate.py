@@ -1,0 +1,39 @@
+"""What an identifier says: faults with uncertainty, a test of fit, and how far to trust it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema.core.status import Reason, Status
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimated fault vector of one cycle.
+
+    Attributes
+    ----------
+    method : str
+        Name of the identifier.
+    k, sd : arrays, shape (6,)
+        Estimate, each within 0…1, and its standard deviation.
+    covariance : array, shape (6, 6)
+        Covariance before the bounds.
+    chi2, dof, p_value : float, int, float
+        Weighted sum of squared residuals, its degrees of freedom and the probability of a larger one if the model holds.
+    residual : array, shape (n_omega,)
+        Measured less modelled envelope at the schedule; NaN where the measurement is not valid. [A]
+    """
+
+    method: str
+    k: np.ndarray
+    sd: np.ndarray
+    covariance: np.ndarray
+    chi2: float
+    dof: int
+    p_value: float
+    residual: np.ndarray
+    status: Status
+    reasons: Reason

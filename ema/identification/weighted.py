@@ -1,0 +1,46 @@
+"""Bounded, weighted least squares of a linearised problem: the one step all identifiers share."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import cholesky, qr, solve_triangular
+from scipy.optimize import lsq_linear, nnls
+from scipy.special import chdtrc
+
+
+class Whitener:
+    """Weights residuals by a covariance Σ = L Lᵀ:   w = L⁻¹ r has unit covariance."""
+
+    def __init__(self, covariance: np.ndarray):
+        self.L = cholesky(covariance, lower=True, check_finite=False)
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """L⁻¹ x for x of shape (n,) or (n, m)."""
+        return np.asarray(solve_triangular(self.L, x, lower=True, check_finite=False))
+
+
+class Solution(NamedTuple):
+    """Minimiser `x` (m,) of ‖b - A x‖² within bounds, and the covariance (AᵀA)⁻¹ (m, m)."""
+
+    x: np.ndarray
+    covariance: np.ndarray
+
+
+def bounded_least_squares(A: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> Solution:
+    """Minimise ‖b - A x‖² for low ≤ x ≤ high by QR; A (n, m) and b (n,) already whitened."""
+    Q, R = qr(A, mode="economic", check_finite=False)
+    c = Q.T @ b
+    R_inverse = solve_triangular(R + np.diag(np.where(np.diag(R) == 0, 1e-12, 0.0)), np.eye(R.shape[1]))
+    x = R_inverse @ c
+    if (x < low).any() or (x > high).any():
+        x = low + nnls(R, c - R @ low)[0]
+        if (x > high).any():
+            x = lsq_linear(R, c, bounds=(low, high), method="bvls").x
+    return Solution(np.clip(x, low, high), R_inverse @ R_inverse.T)
+
+
+def p_value(chi2: float, dof: int) -> float:
+    """Probability that a χ² variable of `dof` degrees of freedom exceeds `chi2`."""
+    return float(chdtrc(dof, chi2)) if dof > 0 else 1.0

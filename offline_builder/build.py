@@ -1,0 +1,44 @@
+"""The offline phase from configuration to bundle."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from concurrent.futures import Executor
+from pathlib import Path
+
+from ema import bundle as bundles
+from ema.bundle import Bundle
+from ema.core import config
+from ema.models.actuator import Actuator
+
+from . import campaign
+from .analysis import analyse
+from .config import Builder
+from .runs import plan
+
+
+def read(path: Path) -> tuple[Builder, Actuator]:
+    """The builder's configuration and the plant it names."""
+    builder = config.load(path, Builder)
+    return builder, config.load(path.parent / builder.plant, Actuator)
+
+
+def build(
+    builder: Builder,
+    plant: Actuator,
+    out: Path,
+    pool: Executor,
+    progress: Callable[[int, int], None] = lambda done, of: None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Bundle:
+    """Run (or resume) the campaign and write the bundle; the work folder is removed when the bundle stands."""
+    work = out.with_name(out.name + ".work")
+    runs = plan(builder, plant)
+    envelopes = campaign.run(runs, plant, work, pool, progress)
+    arrays, figures = analyse(envelopes, runs, plant, builder, say)
+    made = bundles.save(
+        out, plant, builder.model_dump(mode="json"), arrays, builder_hash=config.digest(builder), figures=figures
+    )
+    shutil.rmtree(work)
+    return made

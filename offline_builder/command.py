@@ -1,0 +1,51 @@
+"""`ema build`: the offline phase."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import click
+
+
+@click.command(short_help="The offline phase: campaign, POD, schedule, A, LF2 library → bundle.")
+@click.option("--config", "config_path", required=True, type=click.Path(path_type=Path), help="builder YAML")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="folder of the bundle")
+@click.option("--workers", type=click.IntRange(1, 512), default=None, help="processes (default: one for each core)")
+def build(config_path: Path, out: Path, workers: int | None) -> None:
+    """Run the HF campaign and write the bundle the daemon works with.
+
+    An interrupted build goes on where it was when called again.
+
+    \b
+    Example:
+      ema build --config config/builder-quick.yaml --out bundle
+    """
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from . import build as phase
+
+    builder, plant = phase.read(config_path)
+    console = Console(stderr=True)
+    bar = Progress(
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
+    )
+    with bar, ProcessPoolExecutor(workers or os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        task = bar.add_task("HF runs", total=None)
+        made = phase.build(
+            builder,
+            plant,
+            out,
+            pool,
+            lambda done, of: bar.update(task, completed=done, total=of),
+            lambda text: console.print(f"  {text}"),
+        )
+    figures = made.manifest["figures"]
+    click.echo(
+        f"{out}: {len(made.schedule)} points ({builder.schedule.method}), λ1 share {figures['lambda_1_share']:.4f}, "
+        f"switching noise {1e3 * figures['noise_rms_A']:.2f} mA rms, {figures['n_runs']:.0f} runs, seed {builder.seed}"
+    )

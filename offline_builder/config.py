@@ -1,0 +1,58 @@
+"""Configuration of the offline phase."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from ema.core.config import Settings
+from ema.core.units import quantity
+
+
+class Campaign(Settings):
+    """Latin hypercube of fault vectors for POD and model errors."""
+
+    n_snapshots: int = Field(ge=20, le=10_000_000, description="fault vectors n_s")
+    k_max: float = quantity("", "largest fault drawn", gt=0, le=1)
+
+
+class Jacobian(Settings):
+    """Finite differences at k = 0."""
+
+    steps: list[float] = Field(min_length=1, max_length=10, description="candidate steps, ascending")
+    signal_to_noise: float = quantity(
+        "", "a step is taken if ‖Δi‖ exceeds its noise this many times", 10.0, gt=1, le=1e3
+    )
+
+
+class Library(Settings):
+    """Levels at which the LF2 library is simulated, and its polynomials."""
+
+    k1_levels: list[float]
+    k2_levels: list[float]
+    phase_levels: list[float]
+    k6_levels: list[float]
+    degree_f1: int = Field(default=2, ge=1, le=5)
+    degree_f2: int = Field(default=3, ge=1, le=5)
+
+
+class Schedule(Settings):
+    """How the sampling points are chosen."""
+
+    method: Literal["som", "uniform", "qr", "greedy"] = "som"
+    n_points: int = Field(default=30, ge=6, le=500)
+
+
+class Builder(Settings):
+    """The whole offline phase."""
+
+    plant: str = Field(description="file of the actuator, relative to this file")
+    seed: int = Field(ge=0, description="everything random derives from it")
+    campaign: Campaign
+    n_seeds: int = Field(ge=2, le=10_000, description="runs averaged for each step and level")
+    n_noise: int = Field(ge=40, le=100_000, description="nominal runs for the switching-noise covariance")
+    n_start: int = Field(ge=40, le=100_000, description="runs from random start states")
+    jacobian: Jacobian
+    library: Library
+    schedule: Schedule = Schedule()
