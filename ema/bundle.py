@@ -30,7 +30,8 @@ _SHAPES = {
     "noise_switching": ("n_omega", "n_omega"), "noise_start": ("n_omega", "n_omega"), "start_B": ("n_omega", 2),
     "start_scale": (2,), "model_error_linear": ("n_omega", "n_omega"), "model_error_lf2": ("n_omega", "n_omega"),
     "noise_rms": ("n_t",),
-    "i_SF": ("n_t",), "i_PH": (3, "n_t"), "f1": ("n_f1",), "f2": ("n_f2",), "k2_levels": ("n_k2",), "i_BLK": ("n_k2", "n_t"),
+    "i_SF": ("n_t",), "i_PH": (3, "n_t"), "f1": ("n_f1",), "f2": ("n_f2",),
+    "k2_levels": ("n_k2",), "i_BLK": ("n_k2", "n_t"),
     "k6_levels": ("n_k6",), "i_zeta": ("n_k6", "n_t"),
 }  # fmt: skip
 
@@ -104,7 +105,8 @@ def save(path: Path, plant: Actuator, builder: dict[str, Any], arrays: dict[str,
             }
         manifest = {
             "format": FORMAT, "version": VERSION, "software": version("ema-monitor"), "order_of_k": list(FAULTS),
-            "plant": plant.model_dump(mode="json"), "plant_hash": digest(plant), "builder": builder, **facts, "arrays": entries,
+            "plant": plant.model_dump(mode="json"), "plant_hash": digest(plant),
+            "builder": builder, **facts, "arrays": entries,
         }  # fmt: skip
         (scratch / "manifest.json").write_text(
             json.dumps(manifest, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
@@ -131,10 +133,10 @@ def load(path: str | Path) -> Bundle:
         raise BundleError(f"{manifest_path}: is not the manifest of an actuator bundle")
     if manifest.get("version") != VERSION:
         raise BundleError(
-            f"{manifest_path}: bundle version {manifest.get('version')!r}, this software reads {VERSION}; build it again"
+            f"{manifest_path}: version {manifest.get('version')!r}, this software reads {VERSION}; build it again"
         )
     if manifest.get("order_of_k") != list(FAULTS):
-        raise BundleError(f"{manifest_path}: order of k {manifest.get('order_of_k')} is not {list(FAULTS)}")
+        raise BundleError(f"{manifest_path}: order of k is not {', '.join(FAULTS)}")
     entries = manifest.get("arrays")
     if not isinstance(entries, dict) or not set(_SHAPES) <= set(entries):
         missing = sorted(set(_SHAPES) - set(entries or {}))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable
 from concurrent.futures import Executor, as_completed
@@ -78,8 +79,6 @@ def _file(work: Path, block: slice) -> Path:
 
 
 def _digest(plan: Plan) -> str:
-    import hashlib
-
     h = hashlib.sha256()
     for array in (plan.k, plan.seeds, plan.start):
         h.update(np.ascontiguousarray(array).tobytes())

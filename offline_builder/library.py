@@ -44,7 +44,7 @@ def modulation(deviation: np.ndarray, i0: np.ndarray) -> np.ndarray:
 
 
 def polynomial_times_shape(k: np.ndarray, d: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Fit d[s, l, :] ≈ f(k[l]) shape[s, :] with one polynomial f = c₁k + c₂k² + … for all shapes, scaled so that c₁ = 1.
+    """Fit d[s, l, :] ≈ f(k[l]) shape[s, :] with one polynomial f = k + c₂k² + … for all shapes.
 
     Alternating least squares from the best rank-one start; each half step is linear.
     """

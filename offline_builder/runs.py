@@ -19,7 +19,7 @@ START_OFFSET = 2e-4  # [rad] stiction holds the user up to about this far from i
 
 @dataclass(frozen=True)
 class Plan:
-    """All runs: fault vectors `k` (n, 6), noise `seeds` (n,), start states `start` (n, N_STATE), and where groups lie."""
+    """All runs: fault vectors `k` (n, 6), noise `seeds` (n,), `start` states (n, N_STATE); where each group lies."""
 
     k: np.ndarray
     seeds: np.ndarray

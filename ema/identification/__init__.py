@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["METHODS", "Estimate", "Identifier", "Measurement", "identifier"]
 
-# Where each identifier is made: a function `make(bundle)`. Those on a dynamic model need a JIT and are imported on demand.
+# Where each identifier is made, by a function `make(bundle)`; imported on demand, since some need a JIT.
 METHODS = {
     "linear": "ema.identification.linear",
     "lf2": "ema.identification.lf2",

@@ -22,7 +22,7 @@ class Estimate:
     covariance : array, shape (6, 6)
         Covariance before the bounds.
     chi2, dof, p_value : float, int, float
-        Weighted sum of squared residuals, its degrees of freedom and the probability of a larger one if the model holds.
+        Weighted sum of squared residuals, its degrees of freedom, probability of a larger one if the model holds.
     residual : array, shape (n_omega,)
         Measured less modelled envelope at the schedule; NaN where the measurement is not valid. [A]
     """

@@ -1,7 +1,7 @@
 """Iterative identification, eq. (4) of the paper, one for every model:   k_j = k_{j-1} + C (AᵀA)⁻¹ Aᵀ Δi_j.
 
-The model is any function from fault vectors (m, 6) to envelopes at the schedule (m, n_omega); base point and all columns of A
-are asked for in one call. C starts at one and is halved until a step succeeds.
+The model is any function from fault vectors (m, 6) to envelopes at the schedule (m, n_omega); base point and all
+columns of A are asked for in one call. C starts at one and is halved until a step succeeds.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class GaussNewton:
         v = measurement.valid
         target = measurement.i_hat - self.noise.start_shift(measurement.start)
         k = np.clip(self.start_from(measurement), 0.0, 1.0)
-        for outer in range(2):  # weights for the size of faults found so far, then once more
+        for _ in range(2):  # weights for the size of faults found so far, then once more
             white = Whitener(self.noise.covariance(measurement.start, k)[np.ix_(v, v)])
             k, A, residual = self._iterate(k, target, v, white)
         covariance = bounded_least_squares(white(A), white(residual), -k, 1.0 - k).covariance

@@ -2,9 +2,9 @@
 
     Σ = Σ_switch + d² Σ_start + ‖k̂‖⁴ M
 
-Σ_switch: two runs of the same actuator differ by what decides its comparators. Σ_start: what is left of the start state's
-influence when its linear part is taken off; it grows with the distance d of the start from the middle of the gap at zero.
-M: error of the model in use, which grows with the square of the faults. All three are measured by the builder.
+Σ_switch: two runs of the same actuator differ by what decides its comparators. Σ_start: what is left of the start
+state's influence when its linear part is taken off; it grows with the distance d of the start from the middle of the
+gap at zero. M: error of the model in use, which grows with the square of the faults. The builder measures all three.
 """
 
 from __future__ import annotations

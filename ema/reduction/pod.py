@@ -1,4 +1,4 @@
-"""Proper orthogonal decomposition of the snapshots, section 3.1 of the paper, in blocks so that memory stays bounded."""
+"""Proper orthogonal decomposition of the snapshots (section 3.1 of the paper), in blocks: memory stays bounded."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from ema.core.errors import ConfigError
 
 
 class Knowledge(NamedTuple):
-    """What a schedule may use: first POD mode (n_times,), Jacobian (n_times, 6), noise covariance (n_times, n_times)."""
+    """What a schedule may use: first POD mode (n_t,), Jacobian (n_t, 6), switching-noise covariance (n_t, n_t)."""
 
     t: np.ndarray
     v1: np.ndarray
@@ -59,7 +59,7 @@ def qr_pivot(know: Knowledge, n: int, seed: int) -> np.ndarray:
 
 
 def greedy(know: Knowledge, n: int, seed: int) -> np.ndarray:
-    """Add the instant that raises log det(Aᵀ Σ⁻¹ A) most, Σ being the switching-noise covariance, among a coarse grid."""
+    """Add, from a grid, the instant that raises log det(Aᵀ Σ⁻¹ A) most; Σ is the switching-noise covariance."""
     grid = np.arange(5, len(know.t), 10)
     A, S = know.A[grid], know.covariance[np.ix_(grid, grid)]
     information = np.eye(A.shape[1]) * 1e-6 * np.sum(A**2) / np.mean(np.diag(S))
