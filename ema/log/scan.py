@@ -18,7 +18,6 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.reader import SeekingReader
 from mcap.records import Attachment, Channel, Metadata
 from mcap.writer import MCAP0_MAGIC
 
@@ -32,7 +31,7 @@ _COMPRESSION_MARK = b"\x04\x00\x00\x00zstd"
 _LIMIT = 256 << 20  # larger chunks and attachments are damage, not data
 _BLOCK = 1 << 20
 _FOOTER_SIZE = _RECORD.size + 20 + len(MCAP0_MAGIC)
-_UNREADABLE = (McapError, struct.error, ValueError, OverflowError, zstandard.ZstdError)
+UNREADABLE = (McapError, struct.error, ValueError, OverflowError, zstandard.ZstdError)
 
 
 class RawMessage(NamedTuple):
@@ -99,7 +98,7 @@ class McapFile:
             if self._begin == self._size:
                 self.close()
                 raise LogError(f"{path}: is not an MCAP file" + (" (it is empty)" if self._size == 0 else ""))
-            self._damage(0, "does not begin as an MCAP file")
+            self.note(0, "does not begin as an MCAP file")
 
     def close(self) -> None:
         """Close the file."""
@@ -127,20 +126,23 @@ class McapFile:
         """Messages in the order of the file whose topic is `wanted` and whose time is in [start_ns, end_ns)."""
         low, high = start_ns or 0, 2**64 if end_ns is None else end_ns
         chosen: dict[int, bool] = {}
+        for offset, records in self.blocks(low, high):
+            yield from self._pick(records, offset, chosen, wanted, low, high)
+
+    def blocks(self, start_ns: int = 0, end_ns: int = 2**64) -> Iterator[tuple[int, bytes]]:
+        """Offset and decompressed records of every sound chunk that overlaps the time range, and of records outside."""
         at = self._begin
         while record := self._record(at):
             at = record.end
             if record.opcode == Opcode.CHUNK:
-                records = self._chunk(record, low, high)
+                records = self._chunk(record, start_ns, end_ns)
                 if records is None:
-                    self._damage(record.offset, "a chunk is damaged")
+                    self.note(record.offset, "a chunk is damaged")
                     at = self._next_chunk(record.offset + 1)
-                    continue
-            elif record.opcode in (Opcode.CHANNEL, Opcode.MESSAGE):
-                records = self._read(record.offset, record.end - record.offset)
-            else:
-                continue
-            yield from self._pick(records, record.offset, chosen, wanted, low, high)
+                elif records:
+                    yield record.offset, records
+            elif record.opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
+                yield record.offset, self._read(record.offset, record.end - record.offset)
 
     def attachments(self) -> Iterator[Attachment]:
         """Attached files."""
@@ -152,8 +154,8 @@ class McapFile:
                 if zlib.crc32(content[:-4]) != int.from_bytes(content[-4:], "little"):
                     raise ValueError("CRC")
                 yield Attachment.read(ReadDataStream(io.BytesIO(content)))
-            except _UNREADABLE:
-                self._damage(record.offset, "an attachment is damaged")
+            except UNREADABLE:
+                self.note(record.offset, "an attachment is damaged")
 
     def metadata(self) -> dict[str, str]:
         """Key-value pairs of all metadata records, joined."""
@@ -163,8 +165,8 @@ class McapFile:
                 content = self._read(record.begin, min(record.length, _LIMIT))
                 try:
                     pairs |= Metadata.read(ReadDataStream(io.BytesIO(content))).metadata
-                except _UNREADABLE:
-                    self._damage(record.offset, "metadata is damaged")
+                except UNREADABLE:
+                    self.note(record.offset, "metadata is damaged")
         return pairs
 
     def _records(self) -> Iterator[_Record]:
@@ -185,7 +187,7 @@ class McapFile:
                 return record
             found = self._next_chunk(offset + 1)
             at_end = found == self._size
-            self._damage(offset, "ends in the middle of a record (unfinished)" if at_end else "a record is damaged")
+            self.note(offset, "ends in the middle of a record (unfinished)" if at_end else "a record is damaged")
             offset = found
         return None
 
@@ -197,7 +199,7 @@ class McapFile:
                 return b""
             content = self._read(record.begin + _CHUNK.size, min(record.length, _LIMIT) - _CHUNK.size)
             data = _decompress(content[:name_length], content[name_length + 8 :], size)
-        except _UNREADABLE:
+        except UNREADABLE:
             return None
         return data if crc in (0, zlib.crc32(data)) else None
 
@@ -222,19 +224,27 @@ class McapFile:
     def _learn(self, content: bytes, offset: int) -> None:
         try:
             channel = Channel.read(ReadDataStream(io.BytesIO(content)))
-        except _UNREADABLE:
-            self._damage(offset, "a channel cannot be read")
+        except UNREADABLE:
+            self.note(offset, "a channel cannot be read")
             return
         if channel.message_encoding == "json":
             self._topics[channel.id] = channel.topic
         else:
             self._topics.setdefault(channel.id, "")
 
+    def _learn_from_summary(self) -> None:
+        at = int.from_bytes(self._read(self._size - _FOOTER_SIZE + _RECORD.size, 8), "little") if self.finished else 0
+        while 0 < at < self._size - _FOOTER_SIZE:
+            record = _Record(self._read(at, 1)[0], at, int.from_bytes(self._read(at + 1, 8), "little"))
+            if record.opcode == Opcode.CHANNEL:
+                self._learn(self._read(record.begin, record.length), at)
+            at = record.end
+
     def _known(self, channel: int, offset: int) -> bool:
         if channel not in self._topics:  # its definition was in a damaged chunk; a finished file repeats it at the end
-            self._topics |= _summary_topics(self.path)
+            self._learn_from_summary()
         if channel not in self._topics:
-            self._damage(offset, f"channel {channel} is not defined")
+            self.note(offset, f"channel {channel} is not defined")
         return channel in self._topics
 
     def _next_chunk(self, offset: int) -> int:
@@ -256,11 +266,12 @@ class McapFile:
         """At most `length` bytes from `offset`: fewer at the end of the file."""
         try:
             self._file.seek(offset)
-            return self._file.read(max(length, 0))
+            return self._file.read(max(0, min(length, self._size - offset)))  # `read` reserves what it is asked for
         except OSError as error:
             raise LogError(f"{self.path}: cannot be read at byte {offset} ({error.strerror})") from error
 
-    def _damage(self, offset: int, what: str) -> None:
+    def note(self, offset: int, what: str) -> None:
+        """Report damage at a place in the file."""
         self._report(Damage(self.path, offset, what))
 
 
@@ -272,14 +283,3 @@ def _decompress(compression: bytes, data: bytes, size: int) -> bytes:
     if zstandard.frame_content_size(data) > _LIMIT:
         raise ValueError("chunk too large")
     return zstandard.decompress(data, max_output_size=size)
-
-
-def _summary_topics(path: Path) -> dict[int, str]:
-    """Topics of JSON channels by the summary at the end of a finished file."""
-    try:
-        with path.open("rb") as file:
-            summary = SeekingReader(file).get_summary()
-    except (*_UNREADABLE, OSError):
-        return {}
-    channels = summary.channels.values() if summary else ()
-    return {channel.id: channel.topic for channel in channels if channel.message_encoding == "json"}

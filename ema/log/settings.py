@@ -11,8 +11,8 @@ from ema.core.units import quantity
 class LogSettings(Settings):
     """Section `log` of the daemon's configuration (without the directory)."""
 
-    segment_size: quantity("MB", "a segment is closed at this size", gt=0) = 256.0  # type: ignore[valid-type]
-    segment_time: quantity("s", "a segment is closed at this age", gt=0) = 600.0  # type: ignore[valid-type]
-    flush_interval: quantity("s", "at most this much is lost on a power cut", ge=0.01, le=60) = 1.0  # type: ignore[valid-type]
+    segment_size: float = quantity("MB", "a segment is closed at this size", 256.0, gt=0)
+    segment_time: float = quantity("s", "a segment is closed at this age", 600.0, gt=0)
+    flush_interval: float = quantity("s", "at most this much is lost on a power cut", 1.0, ge=0.01, le=60)
     keep_segments: int = Field(default=1000, ge=2, description="the oldest segments beyond this many are deleted")
-    keep_free: quantity("MB", "left free on the disk: old segments are deleted, then writing stops", ge=0) = 100.0  # type: ignore[valid-type]
+    keep_free: float = quantity("MB", "left free on the disk: old segments go, then writing stops", 100.0, ge=0)

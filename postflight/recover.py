@@ -1,0 +1,68 @@
+"""`ema recover`: finished copies of unfinished or damaged logs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from ema.core.errors import LogError
+
+_SUFFIX = ".recovered.mcap"
+
+
+@click.command()
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", metavar="DIR", type=click.Path(path_type=Path), help="Where to write (default: beside the log).")
+@click.option("--json", "as_json", is_flag=True, help="Answer for a machine.")
+def recover(logs: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
+    """Write a finished copy, NAME.recovered.mcap, of each unfinished or damaged MCAP log.
+
+    LOG is a file or a directory of files. The log itself is never changed and nothing is overwritten; a log that is
+    finished and sound is left as it is.
+
+    \b
+    Example:
+      ema recover /var/log/ema/ema-20250314T091500000Z-0003.mcap
+    """
+    from ema.log.reader import find_logs
+
+    answers = []
+    failures = []
+    for path in find_logs(logs, (".mcap",)):
+        if path.name.endswith(_SUFFIX) and path not in logs:
+            continue
+        try:
+            answers.append(_one(path, (out or path.parent) / (path.stem + _SUFFIX)))
+        except LogError as error:
+            failures.append(error)
+            answers.append({"log": str(path), "error": str(error)})
+        else:
+            if not as_json:
+                click.echo(answers[-1]["text"])
+    if as_json:
+        click.echo(json.dumps(answers, indent=2))
+    for failure in failures[:-1]:
+        click.echo(f"ema: {failure}", err=True)
+    if failures:
+        raise failures[-1]
+
+
+def _one(path: Path, target: Path) -> dict[str, object]:
+    from ema.log.recovery import is_sound, recover
+
+    if is_sound(path):
+        return {"log": str(path), "recovered": None, "text": f"{path}: finished and sound, nothing to recover"}
+    found = recover(path, target)
+    span = f" over {(found.last_ns - found.first_ns) / 1e9:.1f} s" if found.first_ns and found.last_ns else ""
+    lines = [f"{target}: {found.messages} messages{span}", *(f"  {damage}" for damage in found.damage)]
+    return {
+        "log": str(path),
+        "recovered": str(target),
+        "messages": found.messages,
+        "first_ns": found.first_ns,
+        "last_ns": found.last_ns,
+        "damage": [str(damage) for damage in found.damage],
+        "text": "\n".join(lines),
+    }

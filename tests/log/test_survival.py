@@ -1,0 +1,73 @@
+"""A process killed, power lost, a disk filled: what the log still holds."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ema.log import LogReader, LogSettings, schemas
+from ema.log.segmented import SegmentedLog
+
+SUPPORT = Path(__file__).parents[1] / "support"
+
+
+@pytest.mark.slow
+def test_after_sigkill_at_a_random_moment_at_most_the_interval_is_missing(tmp_path):
+    program = [sys.executable, str(SUPPORT / "log_kill.py"), str(tmp_path), "100", "1"]
+    result = json.loads(subprocess.run(program, check=True, capture_output=True, text=True).stdout)
+    missing = np.array(result["missing"])
+    print(
+        f"SIGKILL: {result['trials']} trials, {result['segments']} segments, flush interval {result['interval']} s; "
+        f"missing at most {missing.max():.3f} s, median {np.median(missing):.3f} s"
+    )
+    assert result["trials"] == 100
+    assert missing.max() <= result["interval"]
+
+
+def test_after_a_power_cut_all_that_was_synced_is_there(tmp_path, make, monkeypatch):
+    """Only what fdatasync has confirmed counts: the file is cut there, and each flush must have brought everything."""
+    synced = {}
+    sync = os.fdatasync
+
+    def recording(descriptor):
+        sync(descriptor)
+        synced[os.readlink(f"/proc/self/fd/{descriptor}")] = os.fstat(descriptor).st_size
+
+    monkeypatch.setattr("ema.log.segment.os.fdatasync", recording)
+    log = SegmentedLog(tmp_path, {}, LogSettings(flush_interval=1, segment_time=4, keep_free=0), 0, 0.0)
+    rng = np.random.default_rng(2)
+    clock, flushed = 0.0, 0
+    for cycle in range(200):
+        log.write(schemas.ESTIMATE.encode(make.estimate(cycle)))
+        clock += rng.uniform(0, 0.2)
+        log.tick(cycle, clock)
+        cut = tmp_path / f"cut-{cycle}"
+        cut.mkdir()
+        for path, size in synced.items():
+            (cut / Path(path).name).write_bytes(Path(path).read_bytes()[:size])
+        with LogReader(cut) as back:
+            found = [m.content["cycle"] for m in back.messages()]
+        assert found == list(range(len(found)))
+        assert len(found) >= flushed
+        flushed = max(flushed, len(found))
+        assert cycle - len(found) < 10  # at most half the interval waits: 0.5 s of steps of 0.1 s on average
+    log.close()
+
+
+def test_a_real_file_system_that_fills_and_empties(tmp_path):
+    script = 'mount -t tmpfs -o size=2m none "$1" && exec "$2" "$3" "$1"'
+    program = ["unshare", "--map-root-user", "--mount", "sh", "-c", script, "sh"]
+    arguments = [str(tmp_path), sys.executable, str(SUPPORT / "log_full_disk.py")]
+    if subprocess.run(["unshare", "--map-root-user", "--mount", "true"], capture_output=True, check=False).returncode:
+        pytest.skip("this kernel lets no user mount a small file system of their own (unshare)")
+    result = json.loads(subprocess.run(program + arguments, check=True, capture_output=True, text=True).stdout)
+    states = result["states"]
+    assert set(states[:9]) == {"OK"}
+    assert set(states[12:29]) == {"FULL"}
+    assert set(states[31:]) == {"OK"}
+    assert result["damage"] == 0
+    assert result["logged"] == result["accepted"]

@@ -1,0 +1,69 @@
+"""Kill processes that log, at random moments, and see what their logs still hold.
+
+Run as a program (no threads, so that it may fork): `python log_kill.py DIRECTORY TRIALS SEED` prints one JSON line.
+"""
+
+import json
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from ema.log import LogReader, LogSettings, LogWriter
+from ema.log.recovery import is_sound, recover
+
+INTERVAL = 0.5
+AT_ONCE = 10
+
+
+def child(directory):
+    log = LogWriter(directory, {"ema.dbc": b"x" * 1000}, LogSettings(flush_interval=INTERVAL, segment_time=0.8))
+    n = 0
+    while True:
+        log.event({"t_ns": time.monotonic_ns(), "level": "info", "code": "n", "text": str(n), "actuator": None})
+        n += 1
+        time.sleep(0.004)
+
+
+def survivors(directory):
+    """Numbers and last time of the events in a log, after recovery of what is not finished."""
+    for path in sorted(directory.glob("*.mcap")):
+        if not is_sound(path):
+            recover(path, path.with_suffix(".recovered"))
+            path.unlink()
+            path.with_suffix(".recovered").rename(path)
+    with LogReader(directory) as log:
+        events = [(int(m.content["text"]), m.t_ns) for m in log.messages()]
+        assert not log.damage
+    assert [n for n, _ in events] == list(range(len(events))), "a hole in the log"
+    return events[-1][1] if events else None
+
+
+def main(directory, trials, seed):
+    rng = np.random.default_rng(seed)
+    missing, segments = [], 0
+    for batch in range(0, trials, AT_ONCE):
+        running = []
+        for trial in range(batch, min(batch + AT_ONCE, trials)):
+            place = directory / str(trial)
+            place.mkdir()
+            pid = os.fork()
+            if pid == 0:
+                child(place)
+            running.append((pid, place, time.monotonic() + rng.uniform(INTERVAL, 4 * INTERVAL)))
+        for pid, place, moment in sorted(running, key=lambda run: run[2]):
+            time.sleep(max(0.0, moment - time.monotonic()))
+            killed_ns = time.monotonic_ns()
+            os.kill(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
+            segments += len(list(place.glob("*.mcap")))
+            last_ns = survivors(place)
+            missing.append((killed_ns - last_ns) / 1e9 if last_ns is not None else float("inf"))
+    print(json.dumps({"trials": len(missing), "interval": INTERVAL, "segments": segments, "missing": missing}))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))
