@@ -29,7 +29,7 @@ def to_unit(value: str, unit: str) -> float:
         import pint
     try:
         quantity = _registry().Quantity(value)
-        return float(quantity.to(unit or "dimensionless").magnitude)
+        return float(f"{quantity.to(unit or 'dimensionless').magnitude:.15g}")  # 0.36 mH is 0.00036 H, not a bit less
     except pint.DimensionalityError as error:
         raise ValueError(f"{value!r} has the wrong unit, expected [{unit or '1'}]") from error
     except (pint.UndefinedUnitError, pint.PintError, ValueError, TypeError, AssertionError) as error:

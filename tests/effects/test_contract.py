@@ -1,0 +1,79 @@
+"""What every effect must keep, whatever it is: it applies at once to a new file in ema/effects."""
+
+from __future__ import annotations
+
+import inspect
+
+import numpy as np
+import pytest
+
+from ema.core import config, resources
+from ema.core.names import FAULTS
+from ema.core.units import convert
+from ema.effects import HOOKS, registry
+from ema.models import hf
+from ema.models.actuator import Actuator
+
+EFFECTS = list(registry().values())
+
+
+@pytest.fixture(scope="module")
+def plant():
+    return config.load(resources.config("actuator.yaml"), Actuator)
+
+
+@pytest.fixture(scope="module")
+def nominal(plant):
+    return hf.simulate(plant, np.zeros(6), noise=False)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+def test_declaration(effect):
+    assert effect.parameters
+    assert set(effect.mistaken_for) <= set(FAULTS)
+    assert set(effect.plants) <= {"ema", "axis"}
+    effect.sentence.format(**effect.neutral())
+    assert effect.separated_by
+    for p in effect.parameters:
+        assert p.low <= p.neutral <= p.high or "compliance" in effect.name
+        assert p.low <= p.start <= p.high
+        if p.unit not in ("1", "1/turn"):
+            convert(p.unit, p.unit)
+    for hook, law in effect.laws.items():
+        n_arguments = HOOKS[hook][1] + len(effect.parameters)
+        assert len(inspect.signature(law).parameters) == n_arguments
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+def test_laws_are_neutral_at_their_neutral_values(effect):
+    rng = np.random.default_rng(1)
+    for hook, law in effect.laws.items():
+        how, n = HOOKS[hook]
+        for x in rng.uniform(-3, 3, (20, n)):
+            assert law(*x, *effect.neutral().values()) == pytest.approx(0.0 if how == "sum" else 1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if "ema" in e.plants], ids=lambda e: e.name)
+def test_neutral_values_leave_the_record_as_it_is(effect, plant, nominal):
+    with_effect = hf.simulate(plant, np.zeros(6), noise=False, effects={effect.name: effect.neutral()})
+    # rounding differs between the two kernels until switching decorrelates them: compare the envelopes' mean
+    assert with_effect.envelope.mean() == pytest.approx(nominal.envelope.mean(), rel=2e-3)
+    assert np.abs(with_effect.theta_u - nominal.theta_u).max() < 5e-5
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if "ema" in e.plants], ids=lambda e: e.name)
+def test_start_values_change_the_record(effect, plant):
+    """An effect that changes nothing cannot be found: at its start value it must be seen in some recorded channel."""
+    start = {p.name: p.start for p in effect.parameters}
+    commands = {"winding_resistance": 3.0, "supply_sag": 3.0, "adc_saturation": 2.0}
+    command = commands.get(effect.name, 1.0) * plant.command()
+    seeds = np.arange(16)
+    a = hf.simulate(plant, np.zeros((16, 6)), command, seeds=seeds)
+    b = hf.simulate(plant, np.zeros((16, 6)), command, seeds=seeds + 100, effects={effect.name: start})
+
+    def distance(channel):
+        x, y = getattr(a, channel), getattr(b, channel)
+        spread = np.sqrt(0.5 * (x.var(axis=0) + y.var(axis=0))) / 4 + 1e-12
+        return np.sqrt(np.mean(((x.mean(axis=0) - y.mean(axis=0)) / spread) ** 2))
+
+    assert max(map(distance, ("i", "envelope", "theta_m", "theta_u", "u_dc"))) > 3.0

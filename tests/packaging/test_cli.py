@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.metadata import entry_points
+
+import pytest
+from click.testing import CliRunner
+
+from ema.cli import cli
+
+COMMANDS = sorted(entry.name for entry in entry_points(group="ema.commands"))
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    program = "from ema.cli import main; main()"
+    return subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, timeout=120)
+
+
+def test_help_lists_every_subcommand():
+    result = CliRunner().invoke(cli, ["--help"])
+    assert result.exit_code == 0
+    for name in COMMANDS:
+        assert name in result.output
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_subcommand_explains_itself_with_an_example(name):
+    result = CliRunner().invoke(cli, [name, "--help"])
+    assert result.exit_code == 0
+    assert "Example" in result.output
+    assert f"ema {name}" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["nonsense"], "nonsense"),
+        (["build"], "--config"),
+        (["build", "--config", "nowhere.yaml", "--out", "x"], "nowhere.yaml"),
+        (["build", "--config", "README.md", "--out", "x"], "README.md"),
+    ],
+)
+def test_wrong_use_is_one_line_and_status_two(arguments, says, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "README.md").write_text("# not YAML: [\n")
+    result = run(*arguments)
+    assert result.returncode == 2
+    assert result.stderr.count("\n") == 1
+    assert result.stderr.startswith("ema: ")
+    assert says in result.stderr
+    assert "Traceback" not in result.stderr
+    assert not (tmp_path / "x").exists()
