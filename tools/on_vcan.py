@@ -16,9 +16,8 @@ import tempfile
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "uml"))
-from machine import HERE, MachineError, boot, directory
+from machine import HERE, MachineError, boot, directory, relay
 
-OUTPUT_BEGINS, OUTPUT_ENDS = "EMA-OUTPUT-BEGINS", "EMA-OUTPUT-ENDS"
 NATIVE = ["unshare", *([] if os.geteuid() == 0 else ["--map-root-user"]), "--net", "sh", "-c"]
 
 
@@ -70,19 +69,7 @@ def run_in_uml(command: list[str], timeout: float) -> int:
         lines = [f"export {key}={shlex.quote(value)}" for key, value in settings.items()]
         lines += [f"cd {shlex.quote(os.getcwd())}", f"exec {shlex.join(command)}"]
         (job / "command.sh").write_text("\n".join(lines) + "\n")
-        around, inside = [], False
-        for line in boot(directory(Path("/")), HERE / "init_host.sh", job, timeout=timeout):
-            if line in (OUTPUT_BEGINS, OUTPUT_ENDS):
-                inside = line == OUTPUT_BEGINS
-            elif inside:
-                print(line, flush=True)
-            else:
-                around.append(line)
-        status = job / "status"
-        if not status.exists():
-            print("\n".join(around[-40:]), file=sys.stderr)
-            raise MachineError("the machine halted before the command had ended (its own lines are above)")
-        return int(status.read_text())
+        return relay(boot(directory(Path("/")), HERE / "init_host.sh", job, timeout=timeout), job)
 
 
 if __name__ == "__main__":

@@ -6,11 +6,12 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 KERNEL = "linux.uml"
+OUTPUT_BEGINS, OUTPUT_ENDS = "EMA-OUTPUT-BEGINS", "EMA-OUTPUT-ENDS"  # printed by the machine around its job's output
 
 
 class MachineError(Exception):
@@ -76,6 +77,28 @@ def boot(root: list[str], init: Path, job: Path, *, timeout: float, memory: str 
         machine.wait()
     if over.is_set():
         raise MachineError(f"the machine was still running after {timeout:g} s and was killed")
+
+
+def relay(lines: Iterable[str], job: Path) -> int:
+    """Print what the job's command prints; return its exit status.
+
+    Raises
+    ------
+    MachineError : the machine halted before the command had ended.
+    """
+    around, inside = [], False
+    for line in lines:
+        if line in (OUTPUT_BEGINS, OUTPUT_ENDS):
+            inside = line == OUTPUT_BEGINS
+        elif inside:
+            print(line, flush=True)
+        else:
+            around.append(line)
+    status = job / "status"
+    if not status.exists():
+        print("\n".join(around[-40:]), file=sys.stderr)
+        raise MachineError("the machine halted before the command had ended (its own lines are above)")
+    return int(status.read_text())
 
 
 def _wide_registers(job: Path) -> dict[str, str]:
