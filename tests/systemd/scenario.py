@@ -126,7 +126,10 @@ def wait(what, condition):
 
 
 def wait_until_running():
-    wait("the daemon is ready", lambda: show("ActiveState", "SubState") == {"ActiveState": "active", "SubState": "running"})
+    wait(
+        "the daemon is ready",
+        lambda: show("ActiveState", "SubState") == {"ActiveState": "active", "SubState": "running"},
+    )
 
 
 def wait_for_estimates(n=2):
@@ -148,7 +151,11 @@ def wait_for_estimates(n=2):
 
 def status_of_main_process():
     lines = Path(f"/proc/{show('MainPID')['MainPID']}/status").read_text().splitlines()
-    return {key: value.strip() for key, _, value in (line.partition(":") for line in lines) if key in ("VmRSS", "Threads", "Uid")}
+    return {
+        key: value.strip()
+        for key, _, value in (line.partition(":") for line in lines)
+        if key in ("VmRSS", "Threads", "Uid")
+    }
 
 
 def keep(step):

@@ -37,6 +37,52 @@ def vcan0(request):
     return INTERFACE
 
 
+@pytest.fixture
+def link(vcan0):
+    """A Link to vcan0; afterwards the interface is there and up again, whatever the test has done."""
+    link = Link(vcan0)
+    yield link
+    if INTERFACE not in dict(socket.if_nameindex()).values():
+        link.create()
+    subprocess.run(["tc", "qdisc", "delete", "dev", vcan0, "root"], check=False, stderr=subprocess.DEVNULL)
+    link.up()
+
+
+class Link:
+    """The interface as root handles it."""
+
+    def __init__(self, interface):
+        self._interface = interface
+
+    def down(self):
+        _run("ip", "link", "set", self._interface, "down")
+
+    def up(self):
+        _run("ip", "link", "set", self._interface, "up")
+
+    def set_mtu(self, mtu):
+        self.down()
+        _run("ip", "link", "set", self._interface, "mtu", str(mtu), "up")
+
+    def delete(self):
+        _run("ip", "link", "delete", self._interface)
+
+    def create(self):
+        _run("ip", "link", "add", "dev", self._interface, "type", "vcan")
+        self.set_mtu(72)
+
+    def throttle(self):
+        """A transmit queue of a few frames that drains slowly: a full one answers ENOBUFS."""
+        _run(*f"tc qdisc add dev {self._interface} root tbf rate 8kbit burst 200 limit 400".split())
+
+    def release(self):
+        _run("tc", "qdisc", "delete", "dev", self._interface, "root")
+
+
+def _run(*words):
+    subprocess.run(words, check=True)
+
+
 class RawCan(socket.socket):
     """A raw CAN FD socket on an interface, written without any code of the project: the tests' own witness."""
 
@@ -52,6 +98,14 @@ class RawCan(socket.socket):
     def send_frame(self, can_id, data):
         """Send `data` as a CAN FD frame; `can_id` with the kernel's flag bits (EXTENDED)."""
         self.send(self.FRAME.pack(can_id, len(data), 0, data))
+
+    def send_classic(self, can_id, data):
+        """Send `data` as a classic CAN frame."""
+        self.send(struct.pack("<IB3x8s", can_id, len(data), data))
+
+    def send_error(self, error_class):
+        """What a controller's driver hands up; vcan has no errors of its own."""
+        self.send_classic(error_class | socket.CAN_ERR_FLAG, bytes(8))
 
     def receive_frame(self):
         """The next CAN FD frame: (can_id, data)."""

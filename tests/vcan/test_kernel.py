@@ -2,7 +2,6 @@
 
 import socket
 import struct
-import subprocess
 
 import pytest
 
@@ -21,17 +20,22 @@ def test_fd_frame_between_two_sockets_with_candump_as_witness(raw_can, candump):
     assert bytes.fromhex(flags_and_data[1:]) == payload
 
 
-def test_mtu_of_classic_can_refuses_fd_frames(raw_can, vcan0):
-    def set_mtu(mtu):
-        subprocess.run(["ip", "link", "set", vcan0, "down"], check=True)
-        subprocess.run(["ip", "link", "set", vcan0, "mtu", str(mtu), "up"], check=True)
-
-    set_mtu(16)
+def test_mtu_of_classic_can_refuses_fd_frames(raw_can, link):
+    link.set_mtu(16)
     try:
         with pytest.raises(OSError, match="Invalid argument"):
             raw_can().send_frame(0x123, bytes(64))
     finally:
-        set_mtu(72)
+        link.set_mtu(72)
+
+
+def test_full_transmit_queue_refuses_frames(raw_can, link):
+    sender = raw_can()
+    link.throttle()
+    with pytest.raises(OSError, match="No buffer space"):
+        _send_many(sender)
+    link.release()
+    sender.send_frame(0x123, bytes(64))
 
 
 def test_kernel_counts_what_a_full_receive_buffer_drops(raw_can):
@@ -50,6 +54,11 @@ def test_kernel_counts_what_a_full_receive_buffer_drops(raw_can):
     drops = [struct.unpack("=I", data)[0] for level, kind, data in control if kind == SO_RXQ_OVFL]
     assert 0 < n_received < n_sent
     assert drops == [n_sent - n_received]
+
+
+def _send_many(sender):
+    for _ in range(100):
+        sender.send_frame(0x123, bytes(64))
 
 
 def _readable(can):

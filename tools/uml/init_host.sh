@@ -8,7 +8,7 @@ mkdir -p /run/tmp /dev/shm
 mount -t tmpfs tmpfs /dev/shm
 modules=/usr/lib/uml/modules/$(uname -r)/kernel
 # vcan fails without can-dev.
-for module in net/can/can net/can/can-raw net/can/can-bcm drivers/net/can/dev/can-dev drivers/net/can/vcan; do
+for module in net/can/can net/can/can-raw net/can/can-bcm drivers/net/can/dev/can-dev drivers/net/can/vcan net/sched/sch_tbf; do
     busybox insmod $modules/$module.ko
 done
 . "${0%/*}/vcan_up.sh"
