@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from typing import Any
 
 import can
 import numpy as np
 
 from ema.core import frames as fr
-from ema.core.frames import FrameFlag
+from ema.core.can_messages import fill
+from ema.core.can_messages import message as can_message
 
 from .port import MAX_BATCH, Port
 
@@ -42,7 +42,7 @@ class PythonCanPort(Port):
             if message.is_error_frame:
                 self.counters.n_error_frames += 1
                 continue
-            _fill(batch[count], message)
+            fill(batch[count], message)
             count += 1
         if count:
             self._failing = False
@@ -55,7 +55,7 @@ class PythonCanPort(Port):
         """See Port."""
         for count, frame in enumerate(frames):
             try:
-                self._bus.send(message(frame))
+                self._bus.send(can_message(frame))
             except (can.CanError, OSError) as error:
                 self.counters.n_send_failed += frames.size - count
                 self._say_once(error)
@@ -71,38 +71,3 @@ class PythonCanPort(Port):
         if not self._failing:
             self._events.append(f"{self.name}: {error}")
         self._failing = True
-
-
-def message(frame: Any) -> can.Message:
-    """python-can message of one frame (a scalar of FRAME_DTYPE)."""
-    flags = int(frame["flags"])
-    return can.Message(
-        timestamp=int(frame["t_ns"]) / 1e9,
-        arbitration_id=int(frame["id"]),
-        is_extended_id=bool(flags & FrameFlag.EXTENDED),
-        is_remote_frame=bool(flags & FrameFlag.REMOTE),
-        is_error_frame=bool(flags & FrameFlag.ERROR),
-        is_fd=bool(flags & FrameFlag.FD),
-        bitrate_switch=bool(flags & FrameFlag.BRS),
-        error_state_indicator=bool(flags & FrameFlag.ESI),
-        is_rx=not flags & FrameFlag.TX,
-        dlc=int(frame["length"]),
-        data=None if flags & FrameFlag.REMOTE else frame["data"][: frame["length"]].tobytes(),
-    )
-
-
-def _fill(frame: Any, message: can.Message) -> None:
-    """Write a python-can message into one frame of a zeroed batch."""
-    data = message.data
-    frame["t_ns"] = round(message.timestamp * 1e9)
-    frame["id"] = message.arbitration_id
-    frame["flags"] = (
-        FrameFlag.EXTENDED * message.is_extended_id
-        | FrameFlag.REMOTE * message.is_remote_frame
-        | FrameFlag.FD * message.is_fd
-        | FrameFlag.BRS * message.bitrate_switch
-        | FrameFlag.ESI * message.error_state_indicator
-        | FrameFlag.TX * (not message.is_rx)
-    )
-    frame["length"] = message.dlc
-    frame["data"][: len(data)] = data
