@@ -24,7 +24,7 @@ from ema.models.lf2 import Lf2
 FORMAT = "ema-bundle"
 VERSION = 1
 _LF2 = tuple(field.name for field in fields(Lf2) if field.name != "i0")
-_SHAPES = {
+SHAPES = {
     "i0": ("n_t",), "v1": ("n_t",), "eigenvalue_share": ("r",), "schedule": ("n_omega",), "A": ("n_omega", 6),
     "A_full": ("n_t", 6), "A_step": (6,), "Q": ("n_omega", 6), "R": (6, 6),
     "noise_switching": ("n_omega", "n_omega"), "noise_start": ("n_omega", "n_omega"), "start_B": ("n_omega", 2),
@@ -138,8 +138,8 @@ def load(path: str | Path) -> Bundle:
     if manifest.get("order_of_k") != list(FAULTS):
         raise BundleError(f"{manifest_path}: order of k is not {', '.join(FAULTS)}")
     entries = manifest.get("arrays")
-    if not isinstance(entries, dict) or not set(_SHAPES) <= set(entries):
-        missing = sorted(set(_SHAPES) - set(entries or {}))
+    if not isinstance(entries, dict) or not set(SHAPES) <= set(entries):
+        missing = sorted(set(SHAPES) - set(entries or {}))
         raise BundleError(f"{manifest_path}: lists no array '{missing[0] if missing else 'arrays'}'")
     arrays = {name: _array(path, name, entry) for name, entry in entries.items()}
     bundle = Bundle(path, manifest, arrays)
@@ -162,7 +162,7 @@ def _array(path: Path, name: str, entry: Any) -> np.ndarray:
 
 def _check(bundle: Bundle) -> None:
     size: dict[str, int] = {"n_t": bundle.plant.n_samples}
-    for name, shape in _SHAPES.items():
+    for name, shape in SHAPES.items():
         array = bundle.arrays[name]
         if array.ndim != len(shape) or array.dtype.kind not in "fi":
             raise BundleError(f"{bundle.path / name}.npy: must be numbers of {len(shape)} dimensions")

@@ -1,0 +1,23 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema import bundle
+from ema.core import config, resources
+from ema.models.actuator import Actuator
+
+
+@pytest.fixture
+def small_bundle(tmp_path):
+    """A bundle of the right shapes with made-up numbers: what is checked here is the container."""
+    plant = config.load(resources.config("actuator.yaml"), Actuator)
+    rng = np.random.default_rng(1)
+    size = {"n_t": plant.n_samples, "r": 4, "n_omega": 10, "n_f1": 2, "n_f2": 3, "n_k2": 4, "n_k6": 3}
+    arrays = {
+        name: rng.standard_normal([size.get(n, n) for n in shape])  # type: ignore[arg-type]
+        for name, shape in bundle.SHAPES.items()
+    }
+    arrays["schedule"] = np.arange(10) * 100
+    bundle.save(tmp_path / "made" / "bundle", plant, {}, arrays)
+    return bundle.load(tmp_path / "made" / "bundle")

@@ -1,0 +1,73 @@
+"""A damaged, foreign or newer bundle is refused with one clear line; nothing that is not a bundle is overwritten."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ema import bundle
+from ema.core.errors import EmaError
+
+
+@pytest.fixture
+def copy(small_bundle, tmp_path):
+    return shutil.copytree(small_bundle.path, tmp_path / "bundle")
+
+
+def edited(path, **changes):
+    manifest = json.loads((path / "manifest.json").read_text())
+    manifest.update(changes)
+    (path / "manifest.json").write_text(json.dumps(manifest))
+    return path
+
+
+def test_a_sound_bundle_loads_as_it_was_saved(small_bundle):
+    again = bundle.load(small_bundle.path)
+    for name, array in small_bundle.arrays.items():
+        assert np.array_equal(again.arrays[name], array)
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (lambda p: shutil.rmtree(p), "no manifest.json"),
+        (lambda p: (p / "manifest.json").write_text("{"), "damaged"),
+        (lambda p: (p / "manifest.json").write_text("[]"), "not the manifest"),
+        (lambda p: edited(p, format="other"), "not the manifest"),
+        (lambda p: edited(p, version=99), "version 99"),
+        (lambda p: edited(p, order_of_k=["k2", "k1", "k3", "k4", "k5", "k6"]), "order of k"),
+        (lambda p: edited(p, arrays={}), "lists no array"),
+        (lambda p: edited(p, plant={}), "manifest.json"),
+        (lambda p: (p / "A.npy").write_bytes((p / "A.npy").read_bytes()[:-8]), "A.npy: is damaged"),
+        (lambda p: (p / "A.npy").unlink(), "A.npy: cannot be read"),
+        (lambda p: edited(p, plant_hash="0"), "does not match its hash"),
+    ],
+)
+def test_damage_is_named(copy, damage, says):
+    damage(copy)
+    with pytest.raises(EmaError, match=says) as error:
+        bundle.load(copy)
+    assert "\n" not in str(error.value)
+
+
+def test_a_folder_that_is_no_bundle_is_not_overwritten(small_bundle, tmp_path):
+    (tmp_path / "precious.txt").write_text("mine")
+    with pytest.raises(EmaError, match="is not a bundle"):
+        bundle.save(tmp_path, small_bundle.plant, {}, small_bundle.arrays)
+    assert (tmp_path / "precious.txt").read_text() == "mine"
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
+@given(data=st.binary(max_size=300))
+def test_arbitrary_bytes_are_refused(copy, data):
+    (copy / "A.npy").write_bytes(data)
+    with pytest.raises(EmaError):
+        bundle.load(copy)
+    (copy / "manifest.json").write_bytes(data)
+    with pytest.raises(EmaError):
+        bundle.load(copy)

@@ -1,0 +1,187 @@
+"""The HF model against physics: laws, balances and limits, not stored curves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema.core import config, resources
+from ema.models import hf
+from ema.models.actuator import Actuator
+from ema.models.layout import STATE
+
+PLANT = config.load(resources.config("actuator.yaml"), Actuator)
+SEEDS = np.arange(32)
+
+
+def varied(**sections) -> Actuator:
+    data = PLANT.model_dump()
+    for section, values in sections.items():
+        data[section].update(values)
+    return Actuator.model_validate(data)
+
+
+def runs(k=(0, 0, 0, 0, 0, 0), plant=PLANT, command=None, **kwargs) -> hf.Response:
+    return hf.simulate(plant, np.tile(k, (len(SEEDS), 1)), command, seeds=SEEDS, n_threads=2, **kwargs)
+
+
+def rms(x: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(x))))
+
+
+@pytest.fixture(scope="module")
+def nominal() -> hf.Response:
+    return runs()
+
+
+@pytest.fixture(scope="module")
+def switching_noise(nominal) -> float:
+    return rms(nominal.envelope - nominal.envelope.mean(axis=0))
+
+
+def test_the_controller_keeps_its_law(nominal):
+    """Away from the limit:   θ_cmd - θ_u = (ω_m + I_ref / K_w) / K_p   at every sample."""
+    c = PLANT.control
+    error = PLANT.command() - nominal.theta_u
+    assert np.allclose(error, (nominal.w_m + nominal.I_ref / c.K_w) / c.K_p, atol=1e-9)
+    assert np.abs(nominal.I_ref).max() < PLANT.inverter.I_max
+    assert np.ptp(nominal.theta_u) > 1.5 * PLANT.motion.amplitude
+
+
+def test_halving_the_step_changes_less_than_switching_noise(nominal, switching_noise):
+    finer = runs(dt=0.5e-6)
+    assert rms(finer.envelope.mean(axis=0) - nominal.envelope.mean(axis=0)) < switching_noise
+
+
+@pytest.mark.parametrize("k", [(0, 0, 0, 0, 0, 0), (0.2, 0.1, 0.3, 0, 0.1, 0.2)])
+def test_energy_balance_closes(k):
+    """Electrical in = copper + magnetic + shaft;   shaft = friction and viscous + kinetic, each to 1 %."""
+    r = hf.simulate(PLANT, np.array(k), audited=True)
+    E = {name: float(value[0]) for name, value in r.energy.items()}
+    state = dict(zip(STATE, r.state[0], strict=True))
+    N = 1 - np.array(k[2:5])
+    magnetic = 0.5 * PLANT.motor.L * sum(n**2 * state[f"i_{j}"] ** 2 for n, j in zip(N, "abc", strict=True))
+    kinetic = 0.5 * PLANT.motor.J_m * state["w_m"] ** 2
+    assert E["E_electric"] == pytest.approx(E["E_copper"] + E["E_shaft"] + magnetic, rel=0.01)
+    lost = E["E_friction"] + E["E_user"]  # dry friction; E_user holds the viscous torque
+    assert E["E_shaft"] == pytest.approx(lost + kinetic, rel=0.01)
+    assert E["E_friction"] > 0
+    assert E["E_copper"] > 0
+
+
+def test_envelope_is_the_dc_equivalent_current(nominal):
+    """In six-step the envelope is |I_ref| where the current follows its reference (away from reversals)."""
+    steady = np.abs(nominal.I_ref).mean(axis=0) > 2.0
+    ratio = nominal.envelope.mean(axis=0)[steady] / np.abs(nominal.I_ref).mean(axis=0)[steady]
+    assert np.median(ratio) == pytest.approx(1.0, abs=0.05)
+
+
+def test_friction_raises_current_in_slow_motion(nominal):
+    """k1: F_d × (1 + 3 k1). In slow motion τ = F_d, so the envelope's rise is 3 k1 F_d / 2 k_e."""
+    slow = 2e-3 * np.sin(2 * np.pi * 2.0 * PLANT.time())
+    moving = slice(2800, 3600)  # half a turn after reversal, away from breakaway
+    rise = runs((0.2, 0, 0, 0, 0, 0), command=slow).envelope - runs(command=slow).envelope
+    expected = 3 * 0.2 * PLANT.transmission.F_d / (2 * PLANT.motor.k_e)
+    assert rise[:, moving].mean() == pytest.approx(expected, rel=0.15)
+
+
+def test_backlash_opens_the_gap_between_motor_and_user():
+    """k2: b × (1 + 100 k2). The user lags the gear output by at most b, on both sides."""
+    for k2 in (0.0, 0.2):
+        r = runs((0, k2, 0, 0, 0, 0))
+        b = PLANT.transmission.b * (1 + 100 * k2)
+        gap = r.theta_m / PLANT.transmission.GR - r.theta_u
+        resolution = PLANT.sensors.lvdt_step + 5 * PLANT.sensors.lvdt_noise
+        assert gap.max() == pytest.approx(b, abs=resolution)
+        assert gap.min() == pytest.approx(-b, abs=resolution)
+
+
+ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False) + 0.03
+
+
+def shaft_torque(k) -> np.ndarray:
+    """Torque at 5 A and standstill at each of `ANGLES`, from the acceleration of a rotor without friction. [N m]"""
+    I = 5.0
+    free = varied(inverter={"h": 0.02, "I_max": I}, transmission={"F_s": 0.0, "F_d": 0.0, "b": 0.0}, motor={"C": 0.0})
+    start = hf.start_at(free, ANGLES / free.transmission.GR, ANGLES)
+    far = np.full(16, 0.3)
+    r = hf.simulate(free, np.tile(k, (len(ANGLES), 1)), far, start=start, dt=0.25e-6, noise=False)
+    return free.motor.J_m * (r.w_m[:, 15] - r.w_m[:, 5]) / (r.t[15] - r.t[5])
+
+
+def flat_tops() -> tuple[np.ndarray, np.ndarray]:
+    """Sign of each phase's flat top (3, n) at `ANGLES`, 0 where it idles; and where no phase is near a corner."""
+    x = PLANT.motor.p * ANGLES - 2 * np.pi / 3 * np.arange(3)[:, None]
+    clear = np.all(np.abs(np.abs(np.sin(x)) - 0.5) > 0.06, axis=0)
+    return np.where(np.abs(np.sin(x)) > 0.5, np.sign(np.sin(x)), 0.0), clear
+
+
+def test_torque_is_two_k_e_I_at_every_angle():
+    _, clear = flat_tops()
+    assert np.allclose(shaft_torque(np.zeros(6))[clear], 2 * PLANT.motor.k_e * 5.0, rtol=0.01)
+
+
+@pytest.mark.parametrize("phase", [0, 1, 2])
+def test_a_short_weakens_the_torque_where_its_phase_conducts(phase):
+    """k3-5: κ_j ∝ 1 - k.   τ = (2 - k) k_e I with that phase on its flat top, 2 k_e I where it idles."""
+    k = np.zeros(6)
+    k[2 + phase] = 0.2
+    tops, clear = flat_tops()
+    expected = PLANT.motor.k_e * 5.0 * (2 - 0.2 * np.abs(tops[phase]))
+    assert np.allclose(shaft_torque(k)[clear], expected[clear], rtol=0.015)
+
+
+def test_a_short_lowers_resistance_and_inductance():
+    """R_j = R N_j, L_j = L N_j²: at standstill the supply needs less power, and the current rises faster."""
+    from ema.models.layout import row
+
+    z = hf.parameters(PLANT, np.array([[0, 0, 0.2, 0, 0.5, 0]]), {})[:, 0]
+    assert [z[row(f"R_{j}")] for j in "abc"] == pytest.approx(PLANT.motor.R * np.array([0.8, 1, 0.5]))
+    assert [z[row(f"L_{j}")] for j in "abc"] == pytest.approx(PLANT.motor.L * np.array([0.64, 1, 0.25]))
+
+
+def test_eccentricity_modulates_the_torque_once_per_turn():
+    """k6: κ_j × [1 + ζ cos(θ_m - 2πj/3)]."""
+    tops, clear = flat_tops()
+    wobble = 0.2 * np.cos(ANGLES - 2 * np.pi / 3 * np.arange(3)[:, None])
+    expected = PLANT.motor.k_e * 5.0 * np.sum(np.abs(tops) * (1 + wobble), axis=0)
+    assert np.allclose(shaft_torque([0, 0, 0, 0, 0, 0.2])[clear], expected[clear], rtol=0.015)
+
+
+def test_end_stop_stalls_the_motor():
+    """Beyond its travel the user stands still, the motor too, and the current is at its limit."""
+    near = varied(transmission={"theta_stop": 0.002}, inverter={"I_max": 6.0})
+    r = hf.simulate(near, np.zeros(6), np.full(3000, 0.01))
+    assert r.theta_u[0, 1000:].max() <= 0.002 + 2 * PLANT.sensors.lvdt_step
+    assert np.abs(r.w_m[0, 1000:]).max() == 0.0
+    assert r.envelope[0, 2000] == pytest.approx(6.0, rel=0.05)
+
+
+def test_state_carries_over():
+    """Two halves in sequence are the whole, as long as noise is the same (here: none)."""
+    command = np.concatenate([PLANT.command(), np.zeros(1000)])
+    whole = hf.simulate(PLANT, np.zeros(6), command, noise=False)
+    first = hf.simulate(PLANT, np.zeros(6), command[:3001], noise=False)
+    second = hf.simulate(PLANT, np.zeros(6), command[3000:], noise=False, start=first.state)
+    assert np.array_equal(whole.theta_m[:, 3000:], second.theta_m)
+    assert np.array_equal(whole.i[:, :, 3000:], second.i)
+
+
+def test_a_record_depends_on_its_seed_only():
+    k = np.random.default_rng(3).uniform(0, 0.3, (20, 6))
+    seeds = np.arange(20)
+    together = hf.simulate(PLANT, k, seeds=seeds, n_threads=2)
+    order = np.random.default_rng(4).permutation(20)
+    shuffled = hf.simulate(PLANT, k[order], seeds=seeds[order])
+    assert np.array_equal(together.i[order], shuffled.i)
+    other = hf.simulate(PLANT, k, seeds=seeds + 1000)
+    assert not np.array_equal(together.i, other.i)
+
+
+def test_lanes_and_single_run_agree():
+    """One run alone and in a batch of sixteen: the same to rounding, before switching decorrelates them."""
+    k = np.random.default_rng(5).uniform(0, 0.3, (16, 6))
+    batch = hf.simulate(PLANT, k, PLANT.command()[:300], noise=False)
+    for j in (0, 7, 15):
+        alone = hf.simulate(PLANT, k[j], PLANT.command()[:300], noise=False)
+        assert np.abs(alone.i[0] - batch.i[j]).max() < 1e-9
