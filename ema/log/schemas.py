@@ -118,7 +118,8 @@ ESTIMATE = Kind(
         "reasons": _list("why, or what else to know", {"type": "string", "enum": Reason(sum(Reason)).names}),
         "k": _list(f"fault estimates, 0 healthy … 1 complete failure, {_ORDER}", _VALUE, len(FAULTS)),
         "sd": _list(f"standard deviations of k, {_ORDER}", _VALUE, len(FAULTS)),
-        "p_value": _or_null(_number("chi-square test of the residual", minimum=0, maximum=1)),
+        "p_value": _or_null(_number("probability of a larger residual if the model holds", minimum=0, maximum=1)),
+        "residual": _or_null(_number("root mean square of measured less modelled envelope [A]", minimum=0)),
     },
 )
 

@@ -16,7 +16,7 @@ import numpy as np
 from ema.core.errors import LogError
 from ema.core.status import LogState
 
-from . import retention, schemas
+from . import contents, retention, schemas
 from .batches import Batcher
 from .schemas import Encoded
 from .segment import Segment
@@ -198,5 +198,4 @@ class SegmentedLog:
         lost = self.dropped - self._dropped_before
         text = f"log was {was.name.lower()} for {clock - self._troubled_at:.1f} s, {lost} frames and messages dropped"
         _logger.warning("%s", text)
-        event = {"t_ns": t_ns, "level": "warning", "code": "log_resumed", "text": text, "actuator": None}
-        self.write(schemas.EVENT.encode(event))
+        self.write(schemas.EVENT.encode(contents.event(t_ns, "warning", "log_resumed", text)))

@@ -29,6 +29,7 @@ def _estimate(cycle, actuator=0, method="linear", t_ns=None, k=0.1):
         "k": np.full(6, k) / 3,
         "sd": np.full(6, 0.01),
         "p_value": 0.5,
+        "residual": 0.01,
     }
 
 

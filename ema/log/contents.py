@@ -1,0 +1,85 @@
+"""Contents of messages from what programs hold: one place, so that a live daemon and a replay write the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from ema.core.status import LogState, Reason, ServiceState, Status
+
+
+class EstimateLike(Protocol):
+    """What is logged of an estimate (`ema.identification.estimate.Estimate`)."""
+
+    @property
+    def method(self) -> str: ...  # noqa: D102
+    @property
+    def k(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def sd(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def p_value(self) -> float: ...  # noqa: D102
+    @property
+    def residual(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def status(self) -> Status: ...  # noqa: D102
+    @property
+    def reasons(self) -> Reason: ...  # noqa: D102
+
+
+def estimate(t_ns: int, actuator: int, cycle: int, result: EstimateLike) -> dict[str, Any]:
+    """Content of `schemas.ESTIMATE`; `t_ns` is the time of the cycle's last frame, so that replay gives the same."""
+    return {
+        "t_ns": int(t_ns),
+        "actuator": int(actuator),
+        "method": result.method,
+        "cycle": int(cycle),
+        "status": Status(result.status).name.lower(),
+        "reasons": Reason(result.reasons).names,
+        "k": result.k.tolist(),
+        "sd": result.sd.tolist(),
+        "p_value": float(result.p_value),
+        "residual": rms(result.residual),
+    }
+
+
+def rms(residual: np.ndarray) -> float | None:
+    """Root mean square over what is not NaN; None when nothing is."""
+    seen = residual[np.isfinite(residual)]
+    return float(np.sqrt(np.mean(seen**2))) if seen.size else None
+
+
+def envelope(
+    t_ns: int, actuator: int, cycle: int, t: np.ndarray, measured: np.ndarray, model: np.ndarray, sd: np.ndarray
+) -> dict[str, Any]:
+    """Content of `schemas.ENVELOPE`; arrays of shape (n_omega,), NaN where there is nothing."""
+    return {
+        "t_ns": int(t_ns),
+        "actuator": int(actuator),
+        "cycle": int(cycle),
+        "t": t,
+        "measured": measured,
+        "model": model,
+        "sd": sd,
+    }
+
+
+def event(t_ns: int, level: str, code: str, text: str, actuator: int | None = None) -> dict[str, Any]:
+    """Content of `schemas.EVENT`; `level` is info, warning or error, `code` a short name of the kind of event."""
+    return {"t_ns": int(t_ns), "level": level, "code": code, "text": text, "actuator": actuator}
+
+
+def status(
+    t_ns: int, state: ServiceState, uptime: float, log_state: LogState, log_free: float, counters: Mapping[str, int]
+) -> dict[str, Any]:
+    """Content of `schemas.STATUS`; `uptime` [s], `log_free` [B]."""
+    return {
+        "t_ns": int(t_ns),
+        "state": ServiceState(state).name.lower(),
+        "uptime": float(uptime),
+        "log_state": LogState(log_state).name.lower(),
+        "log_free": float(log_free),
+        "counters": {name: int(count) for name, count in counters.items()},
+    }
