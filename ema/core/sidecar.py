@@ -56,7 +56,7 @@ class Cycles(Settings):
     column: str | None = Field(
         default=None, description="consecutive rows with equal value in this column are one cycle"
     )
-    gap: quantity("s", "a step of the time column longer than this begins a new cycle", gt=0) | None = None  # type: ignore[valid-type]
+    gap: float | None = quantity("s", "a step of the time column longer than this begins a new cycle", None, gt=0)
 
     @model_validator(mode="after")
     def _one_way(self) -> Cycles:

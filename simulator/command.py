@@ -1,0 +1,96 @@
+"""`ema simulate`."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from typing import Any
+
+import click
+
+
+@click.command()
+@click.option("--scenario", "path", required=True, metavar="FILE", help="Scenario YAML.")
+@click.option("--bus", metavar="BUS", help="Instead of the scenario's: auto, vcan0, udp_multicast, virtual:NAME …")
+@click.option("--rate", type=click.FloatRange(0, 1000, min_open=True), help="Scenario time over real time.")
+@click.option("--cycles", "n_cycles", type=click.IntRange(min=1), help="Stop after so many test cycles.")
+@click.option("--csv", "csv_path", metavar="FILE", help="Write the records to a CSV file; no bus.")
+@click.option("--actuator", type=int, help="Which one to write with --csv, where the scenario has several.")
+@click.option("--truth", metavar="FILE", help="Write the true faults of each cycle to a CSV file.")
+def simulate(path: str, csv_path: str | None, actuator: int | None, truth: str | None, **options: Any) -> None:
+    """Put simulated actuators on the bus: test motions at a period, faults that grow, noise, bad frames.
+
+    Ends after the scenario's last cycle, or cleanly on SIGINT and SIGTERM.
+
+    \b
+    Examples:
+      ema simulate --scenario config/scenario.yaml --bus vcan0 --truth truth.csv
+      ema simulate --scenario config/scenario.yaml --cycles 20 --csv flight.csv
+    """
+    from . import scenario as scenarios
+    from .truth import TruthFile
+
+    scenario, plant = scenarios.load(path)
+    scenario = scenarios.override(scenario, **options)
+    numbers = [a.number for a in scenario.actuators]
+    if csv_path is not None:
+        lane = _lane(numbers, actuator)
+    with TruthFile(truth, numbers) if truth else nullcontext() as truth_file:
+        on_cycle = truth_file.add if truth_file else lambda cycle: None
+        if csv_path is not None:
+            _to_csv(scenario, plant, lane, csv_path, on_cycle)
+        else:
+            _to_bus(scenario, plant, on_cycle)
+
+
+def _lane(numbers: list[int], actuator: int | None) -> int:
+    if actuator is None and len(numbers) == 1:
+        return 0
+    if actuator not in numbers:
+        given = "none was chosen" if actuator is None else f"{actuator} is not one of them"
+        raise click.UsageError(f"--csv writes one actuator; the scenario has {numbers} and {given} (--actuator)")
+    return numbers.index(actuator)
+
+
+def _to_csv(scenario: Any, plant: Any, lane: int, path: str, on_cycle: Any) -> None:
+    from ema.bus import codec
+    from ema.core.csv_records import write_csv
+    from ema.core.errors import ConfigError
+    from ema.core.records import Record
+
+    from .injection import FaultSource
+    from .node import cycles
+    from .to_record import to_cycle
+
+    if scenario.n_cycles is None:
+        raise ConfigError("a record needs an end: give the scenario n_cycles, or the command --cycles")
+    written = []
+    for cycle in cycles(scenario, plant, FaultSource(scenario, codec.default())):
+        on_cycle(cycle)
+        written.append(to_cycle(cycle, lane))
+    write_csv(Record(tuple(written)), path)
+    click.echo(f"{path}: {len(written)} cycles of actuator {scenario.actuators[lane].number}", err=True)
+
+
+def _to_bus(scenario: Any, plant: Any, on_cycle: Any) -> None:
+    import signal
+    import threading
+
+    from ema.bus import codec
+    from ema.bus.interface import open_bus
+
+    from .node import run
+
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+
+    def say(line: str) -> None:
+        click.echo(line, err=True)
+
+    with open_bus(scenario.bus) as port:
+        say(port.choice)
+        done = run(scenario, plant, port, codec.default(), stop, on_cycle=on_cycle, say=say)
+    say(
+        f"{done.n_cycles} cycles, {done.n_frames} frames sent, {done.n_refused} refused by the bus, "
+        f"{done.n_injections} fault injections, schedule moved {done.n_delays} times"
+    )

@@ -1,0 +1,87 @@
+"""From a simulated cycle to the frames an actuator sends, each with the time it is due."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ema.bus.codec import Codec
+from ema.bus.identifiers import with_actuator
+from ema.bus.protection import Sender
+
+from .fleet import CycleData
+
+_PER_FRAME = 10  # samples in a frame, as the DBC lays them out
+_MOTION_EVERY = 10  # current samples to one motion sample
+_CHIRP = 0
+
+
+class Traffic:
+    """Encodes cycles of several actuators; keeps their running sequence numbers."""
+
+    def __init__(self, codec: Codec, numbers: Sequence[int]):
+        self._codec = codec
+        self._numbers = numbers
+        self._sender = Sender()
+
+    def frames(self, cycle: CycleData, period: float) -> tuple[np.ndarray, np.ndarray]:
+        """Everything the actuators send from the start of a cycle to the start of the next.
+
+        Returns
+        -------
+        frames : array, shape (n,), dtype FRAME_DTYPE
+            Protected, in the order they are due.
+        due : array, shape (n,)
+            When each has to leave, since the start of the cycle. [s]
+        """
+        parts = [part for lane in range(len(self._numbers)) for part in self._of_actuator(cycle, lane, period)]
+        frames = np.concatenate([f for f, _ in parts])
+        due = np.concatenate([np.broadcast_to(d, f.size) for f, d in parts])
+        order = np.argsort(due, kind="stable")
+        return self._sender.protect(frames[order]), due[order]
+
+    def _of_actuator(self, cycle: CycleData, lane: int, period: float) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Frames of one actuator with their due times; frames due together keep this order."""
+        number, response = self._numbers[lane], cycle.response
+        n_times, dt = cycle.t.size, float(cycle.t[1] - cycle.t[0])
+        slow = slice(0, n_times, _MOTION_EVERY)
+        n_current = math.ceil(n_times / _PER_FRAME)
+        n_motion = math.ceil(math.ceil(n_times / _MOTION_EVERY) / _PER_FRAME)
+        due_current = np.arange(1, n_current + 1) * _PER_FRAME * dt
+        due_motion = np.arange(1, n_motion + 1) * _PER_FRAME * _MOTION_EVERY * dt
+        due_motion[-1] = due_current[-1]
+        n_supply = round(period / self._codec.messages["Supply"].period)
+        due_supply = np.arange(n_supply) * period / max(n_supply, 1)
+        bounds = {
+            "cycle": cycle.number,
+            "first_current": self._next_sequence("PhaseCurrents", number),
+            "first_motion": self._next_sequence("Motion", number),
+            "n_samples": n_times,
+            "period": dt,
+            "motion_kind": _CHIRP,
+        }
+        currents = {f"i_{phase}": _in_tens(response.i[lane, j]) for j, phase in enumerate("abc")}
+        motion = {
+            "theta_u": _in_tens(response.theta_u[lane, slow]),
+            "theta_m": _in_tens(response.theta_m[lane, slow] % (2 * np.pi)),
+            "theta_cmd": _in_tens(cycle.theta_cmd[slow]),
+        }
+        u_dc = np.interp(due_supply, cycle.t, response.u_dc[lane])
+        encode = self._codec.encode
+        return [
+            (encode("CycleStart", number, bounds), np.zeros(1)),
+            (encode("PhaseCurrents", number, currents), due_current),
+            (encode("Motion", number, motion), due_motion),
+            (encode("CycleEnd", number, bounds), due_current[-1:]),
+            (encode("Supply", number, {"u_dc": u_dc, "temp_w": cycle.temp_w[lane]}), due_supply),
+        ]
+
+    def _next_sequence(self, name: str, number: int) -> int:
+        return self._sender.next_sequence(with_actuator(self._codec.messages[name].frame_id, number))
+
+
+def _in_tens(x: np.ndarray) -> np.ndarray:
+    """Samples as rows of ten, the last row filled up with zeros."""
+    return np.pad(x, (0, -x.size % _PER_FRAME)).reshape(-1, _PER_FRAME)

@@ -1,0 +1,101 @@
+"""`ema simulate` as a user calls it."""
+
+import csv
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ema_simulator.node import run
+from ema_simulator.scenario import load
+
+from ema.bus.interface import open_bus, parse
+from ema.bus.protection import Check, Receiver
+from ema.core.records import read_record
+
+EMA = Path(sys.executable).with_name("ema")
+
+
+def ema(*words, **options):
+    return subprocess.run([EMA, *map(str, words)], capture_output=True, text=True, timeout=120, **options)
+
+
+def test_a_record_is_written_with_its_truth(write, tmp_path):
+    path = write("n_cycles: 2\nactuators: [{number: 3, faults: {k3: [[0, 0.0], [1, 0.2]]}}]")
+    done = ema("simulate", "--scenario", path, "--csv", tmp_path / "x.csv", "--truth", tmp_path / "t.csv")
+    assert (done.returncode, done.stdout) == (0, "")
+    record = read_record(tmp_path / "x.csv")
+    assert record.n_cycles == 2
+    assert {"i_a", "theta_m", "u_dc", "temp_w"} < set(record.channels)
+    rows = list(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))
+    assert [(row["cycle"], row["actuator"], float(row["k3"])) for row in rows] == [("0", "3", 0.0), ("1", "3", 0.2)]
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "said"),
+    [
+        ("n_cycles: 1\nseed: -1", [], "seed"),
+        ("seed: 1", ["--csv", "x.csv"], "a record needs an end"),
+        ("n_cycles: 1\nactuators: [{number: 1}, {number: 2}]", ["--csv", "x.csv"], "--actuator"),
+        ("n_cycles: 1", ["--bus", "nonsense:x"], "bus nonsense:x cannot be opened"),
+        ("n_cycles: 1", ["--rate", "0"], "--rate"),
+        ("n_cycles: 1", ["--truth", "/nowhere/t.csv"], "/nowhere/t.csv: cannot be written"),
+    ],
+)
+def test_wrong_use_is_one_line_and_status_2(write, tmp_path, text, words, said):
+    done = ema("simulate", "--scenario", write(text), *words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "x.csv").exists()
+
+
+def test_nothing_is_overwritten(write, tmp_path):
+    (tmp_path / "t.csv").write_text("mine")
+    done = ema("simulate", "--scenario", write("n_cycles: 1"), "--truth", tmp_path / "t.csv")
+    assert done.returncode == 2
+    assert (tmp_path / "t.csv").read_text() == "mine"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_cleanly(write, tmp_path, number):
+    truth = tmp_path / "t.csv"
+    process = subprocess.Popen(
+        [EMA, "simulate", "--scenario", write("seed: 0"), "--bus", "virtual", "--truth", truth],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while not (truth.exists() and truth.read_text().count("\n") > 1):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert "cycles," in errors
+    assert "Traceback" not in errors
+
+
+def test_on_the_bus_at_a_given_rate(write, codec):
+    """A node in this process, faster than real time: everything arrives, in order, protected."""
+    scenario, plant = load(write("n_cycles: 3\nrate: 5\nactuators: [{number: 0}, {number: 1}]"))
+    received = []
+    with open_bus(parse("virtual:sim")) as listener, open_bus(parse("virtual:sim")) as port:
+        seen = []
+        node = threading.Thread(
+            target=lambda: seen.append(run(scenario, plant, port, codec, threading.Event())), daemon=True
+        )
+        node.start()
+        while node.is_alive():
+            received.append(listener.read(0.1))
+        received.append(listener.read(0.1))
+        node.join()
+    (summary,) = seen
+    frames = np.concatenate(received)
+    assert summary.n_cycles == 3
+    assert frames.size == summary.n_frames == 3 * 2 * (501 + 51 + 10 + 2)
+    assert (Receiver(codec).check(frames) == Check.OK).all()

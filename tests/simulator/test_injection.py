@@ -1,0 +1,49 @@
+import numpy as np
+import pytest
+from ema_simulator.injection import FaultSource
+from ema_simulator.scenario import load
+
+from ema.bus.protection import Sender
+
+TARGET = [0.1, 0.0, 0.3, 0.0, 0.0, 0.0]
+
+
+@pytest.fixture
+def source(write, codec):
+    def make(allowed: str):
+        scenario, _ = load(write(f"allow_injection: {allowed}\nactuators: [{{number: 2, faults: {{k1: 0.05}}}}]"))
+        return FaultSource(scenario, codec)
+
+    return make
+
+
+def control(codec, actuator, k, ramp_time):
+    return Sender().protect(codec.encode("SimulatorControl", actuator, {"k": np.array(k), "ramp_time": ramp_time}))
+
+
+def test_an_allowed_injection_ramps_from_where_the_faults_are(source, codec):
+    faults = source("true")
+    faults.listen(control(codec, 2, TARGET, 10.0), t=100.0)
+    assert faults.at(100.0)[0] == pytest.approx([0.05, 0, 0, 0, 0, 0])
+    assert faults.at(105.0)[0] == pytest.approx([0.075, 0, 0.15, 0, 0, 0])
+    assert faults.at(200.0)[0] == pytest.approx(TARGET)
+    assert faults.n_injections == 1
+
+
+def test_where_the_scenario_does_not_allow_it_nothing_happens(source, codec):
+    faults = source("false")
+    faults.listen(control(codec, 2, TARGET, 0.0), t=1.0)
+    assert faults.at(2.0)[0] == pytest.approx([0.05, 0, 0, 0, 0, 0])
+    assert faults.n_injections == 0
+
+
+def test_damaged_foreign_and_repeated_frames_are_not_obeyed(source, codec):
+    faults = source("true")
+    damaged = control(codec, 2, TARGET, 0.0)
+    damaged["data"][0, 5] ^= 1
+    faults.listen(damaged, t=1.0)
+    faults.listen(control(codec, 3, TARGET, 0.0), t=1.0)
+    assert faults.n_injections == 0
+    for _ in range(3):
+        faults.listen(control(codec, 2, TARGET, 0.0), t=1.0)
+    assert faults.n_injections == 1
