@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import math
+
 from numba import njit
 
 from .vector_math import TWO_PI, fraction_of_turn
 
 
 @njit(inline="always")
-def _ramp(theta_e):
-    """Triangle wave in phase with the sine, from -3 to 3; the trapezoid is its clipped middle."""
-    return 3.0 - 12.0 * abs(fraction_of_turn(theta_e / TWO_PI - 0.25))
-
-
-@njit(inline="always")
 def trap(theta_e):
-    """Unit trapezoid in phase with sin θ_e, flat from 30° to 150°."""
-    return min(max(_ramp(theta_e), -1.0), 1.0)
+    """Unit trapezoid in phase with sin θ_e, flat from 30° to 150°: the clipped middle of a triangle wave."""
+    ramp = 3.0 - 12.0 * abs(fraction_of_turn(theta_e / TWO_PI - 0.25))
+    return min(max(ramp, -1.0), 1.0)
 
 
 @njit(inline="always")
-def six_step(theta_e):
-    """Reference current of one phase per unit: the sign of the trapezoid's flat top, else 0."""
-    r = _ramp(theta_e)
-    return 1.0 if r >= 1.0 else (-1.0 if r <= -1.0 else 0.0)
+def sector(theta_e):
+    """Number of the 60° sector, counted from 30° electrical; one number for all three phases, so that at a corner
+    rounding cannot leave two of them idle at once.
+    """
+    return math.floor(6.0 * theta_e / TWO_PI - 0.5)
+
+
+@njit(inline="always")
+def six_step(sector_j):
+    """Reference current per unit of a phase: 1 in its sectors 0 and 1, -1 in 3 and 4, else 0 (phase B: sector - 2)."""
+    m = sector_j - 6.0 * math.floor(sector_j / 6.0)
+    return 1.0 if m < 1.5 else (-1.0 if (m > 2.5 and m < 4.5) else 0.0)

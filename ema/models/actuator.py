@@ -18,6 +18,7 @@ class Motor(Settings):
     L: float = quantity("H", "phase inductance", gt=1e-6, le=1)
     k_e: float = quantity("V s/rad", "back-EMF = torque coefficient of one phase, flat top", gt=0, le=100)
     p: int = Field(ge=1, le=50, description="pole pairs")
+    theta_0: float = quantity("rad", "electrical angle of the rotor at θ_m = 0", 0.0, ge=-7, le=7)
     J_m: float = quantity("kg m^2", "inertia of rotor and reflected gears", gt=0, le=10)
     C: float = quantity("N m s/rad", "viscous coefficient", ge=0, le=1)
     phi: float = quantity("rad", "direction of the eccentricity", 0.0, ge=-7, le=7)

@@ -68,7 +68,7 @@ def parameters(plant: Actuator, k: np.ndarray, effects: Effects, dT: float | np.
     z[row("F_s")], z[row("F_d")] = faults.friction(g.F_s, k[:, 0]), faults.friction(g.F_d, k[:, 0])
     z[row("b")], z[row("zeta")], z[row("dT")] = faults.backlash(g.b, k[:, 1]), k[:, 5], dT
     for section, names in (
-        (m, ("p", "phi", "J_m", "C")),
+        (m, ("p", "theta_0", "phi", "J_m", "C")),
         (inv, ("V_dc", "h", "I_max")),
         (g, ("GR", "theta_stop")),
         (c, ("K_p", "K_w")),

@@ -12,7 +12,7 @@ from numba import njit
 from ema.effects.backlash import deflection, follow
 from ema.effects.dry_friction import speed_after
 from ema.effects.inverter import comparator, leg_voltage
-from ema.effects.trapezoid import six_step, trap
+from ema.effects.trapezoid import sector, six_step, trap
 from ema.effects.vector_math import TWO_PI, cos, sin
 
 from . import (
@@ -27,6 +27,7 @@ LAG1_A, LAG1_B, LAG1_C, LAG2_A, LAG2_B, LAG2_C = (row(f"lag{n}_{j}") for n in "1
 THETA_M, W_M, THETA_U, W_U, U_DC, ANGLE_ERROR, I_REF = map(
     row, ("theta_m", "w_m", "theta_u", "w_u", "u_dc", "angle_error", "I_ref")
 )
+THETA_0 = row("theta_0")
 R_A, R_B, R_C, L_A, L_B, L_C, K_A, K_B, K_C = (row(f"{x}_{j}") for x in "RLk" for j in "abc")
 P, ZETA, PHI, V_DC, H, I_MAX, J_M, C, F_S, F_D, GR, B, THETA_STOP = map(
     row, ("p", "zeta", "phi", "V_dc", "h", "I_max", "J_m", "C", "F_s", "F_d", "GR", "b", "theta_stop")
@@ -54,11 +55,11 @@ def electrical_step(z, l, N, dt, extended, audited):
     """Advance currents by one step and return the motor torque (the paper's three-phase motor with inverter).
 
     v_j - v_n = R_j i_j + L_j di_j/dt + κ_j ω_m,   Σ i_j = 0,   τ_m = Σ κ_j i_j
-    κ_j = k_e N_j [1 + ζ cos(θ_m + φ - 2πj/3)] trap(p θ_m - 2πj/3)
+    κ_j = k_e N_j [1 + ζ cos(θ_m + φ - 2πj/3)] trap(p θ_m + θ₀ - 2πj/3)
     """
     i_a, i_b, i_c = z[I_A * N + l], z[I_B * N + l], z[I_C * N + l]
     theta_m, w_m, p, zeta = z[THETA_M * N + l], z[W_M * N + l], z[P * N + l], z[ZETA * N + l]
-    theta_e = p * theta_m
+    theta_e = p * theta_m + z[THETA_0 * N + l]
 
     # back-EMF and torque coefficients
     c, s = cos(theta_m + z[PHI * N + l]), sin(theta_m + z[PHI * N + l])
@@ -73,9 +74,10 @@ def electrical_step(z, l, N, dt, extended, audited):
     if len(extended) == 0:
         u_dc = z[V_DC * N + l]
         x_a, x_b, x_c = i_a, i_b, i_c
-        s_a = comparator(z[S_A * N + l], I_ref * six_step(theta_e) - x_a, h)
-        s_b = comparator(z[S_B * N + l], I_ref * six_step(theta_e - THIRD) - x_b, h)
-        s_c = comparator(z[S_C * N + l], I_ref * six_step(theta_e + THIRD) - x_c, h)
+        n = sector(theta_e)
+        s_a = comparator(z[S_A * N + l], I_ref * six_step(n) - x_a, h)
+        s_b = comparator(z[S_B * N + l], I_ref * six_step(n - 2.0) - x_b, h)
+        s_c = comparator(z[S_C * N + l], I_ref * six_step(n + 2.0) - x_c, h)
         v_a, v_b, v_c = 0.5 * u_dc * s_a, 0.5 * u_dc * s_b, 0.5 * u_dc * s_c
     else:
         dT = z[DT * N + l]
@@ -90,10 +92,10 @@ def electrical_step(z, l, N, dt, extended, audited):
         x_a = (1.0 + z[GAIN_A * N + l]) * i_a + z[OFFSET_A * N + l]
         x_b = (1.0 + z[GAIN_B * N + l]) * i_b + z[OFFSET_B * N + l]
         x_c = (1.0 + z[GAIN_C * N + l]) * i_c + z[OFFSET_C * N + l]
-        theta_s = p * (theta_m + hooks.angle_error(z, l, N, theta_m)) + z[COMMUTATION * N + l]
-        s_a = comparator(z[S_A * N + l], I_ref * six_step(theta_s) - x_a, h)
-        s_b = comparator(z[S_B * N + l], I_ref * six_step(theta_s - THIRD) - x_b, h)
-        s_c = comparator(z[S_C * N + l], I_ref * six_step(theta_s + THIRD) - x_c, h)
+        n = sector(theta_e + p * hooks.angle_error(z, l, N, theta_m) + z[COMMUTATION * N + l])
+        s_a = comparator(z[S_A * N + l], I_ref * six_step(n) - x_a, h)
+        s_b = comparator(z[S_B * N + l], I_ref * six_step(n - 2.0) - x_b, h)
+        s_c = comparator(z[S_C * N + l], I_ref * six_step(n + 2.0) - x_c, h)
         dead = z[DEAD_TIME * N + l]
         off_a = dead if s_a != z[S_A * N + l] else z[OFF_A * N + l]
         off_b = dead if s_b != z[S_B * N + l] else z[OFF_B * N + l]

@@ -16,7 +16,7 @@ STATE = (
 )
 # What stays as it is during a run.
 PARAMETERS = (
-    *("R_a", "R_b", "R_c", "L_a", "L_b", "L_c", "k_a", "k_b", "k_c", "p", "zeta", "phi"),
+    *("R_a", "R_b", "R_c", "L_a", "L_b", "L_c", "k_a", "k_b", "k_c", "p", "theta_0", "zeta", "phi"),
     *(
         "V_dc",
         "h",
