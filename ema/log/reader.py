@@ -67,7 +67,7 @@ class LogReader:
         try:
             for path in find_logs(paths, (".mcap",)):
                 self._files.append(McapFile(path, self._note))
-            self._files.sort(key=lambda file: (file.first_time() or 0, file.path.name))
+            self._files.sort(key=_order)
         except LogError:
             self.close()
             raise
@@ -84,6 +84,11 @@ class LogReader:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def first_ns(self) -> int | None:
+        """Time of the first message of all, None when there is none. [ns]"""
+        times = (file.first_time() for file in self._files)
+        return min((t for t in times if t is not None), default=None)
 
     @property
     def paths(self) -> list[Path]:
@@ -144,6 +149,11 @@ class LogReader:
     def _note(self, damage: Damage) -> None:
         if len(self.damage) < 1000 and damage not in self.damage:
             self.damage.append(damage)
+
+
+def _order(file: McapFile) -> tuple[bool, int, str]:
+    first_ns = file.first_time()
+    return (first_ns is None, first_ns or 0, file.path.name)
 
 
 def find_logs(paths: Paths, suffixes: tuple[str, ...]) -> list[Path]:

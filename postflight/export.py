@@ -1,0 +1,84 @@
+"""`ema export`: logs as tables for other tools, or as raw logs of other tools."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ema.core.errors import LogError
+
+from .times import TimeOption, time_range
+
+_WHAT = ("estimates", "envelopes", "events", "status", "signals")
+
+
+@click.command()
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--out", metavar="PATH", required=True, type=click.Path(path_type=Path),
+    help="Directory for tables, or a file NAME.asc, .blf, .log, .trc, .mf4, .db or .mcap for raw frames.",
+)  # fmt: skip
+@click.option("--format", "kind", type=click.Choice(["csv", "parquet"]), default="csv", show_default=True)
+@click.option(
+    "--what", multiple=True, type=click.Choice(_WHAT), help="Which tables (repeatable; default: all but the signals)."
+)
+@time_range
+def export(
+    logs: tuple[Path, ...], out: Path, kind: str, what: tuple[str, ...], start: TimeOption, end: TimeOption
+) -> None:
+    """Write estimates, envelopes, events, status and decoded signals as tables with units in the header.
+
+    With a file name of another tool as --out, the raw frames go there. Nothing is overwritten.
+
+    \b
+    Examples:
+      ema export /var/log/ema --out tables
+      ema export flight.mcap --out tables --format parquet --what estimates --what signals
+      ema export flight.mcap --out flight.blf --start 10 --end 20
+    """
+    from .open_log import open_log, open_mcap
+
+    if out.suffix:
+        if what:
+            raise click.UsageError("--what names tables, and those need a directory as --out")
+        with open_log(logs, start, end) as log:
+            click.echo(f"{out}: {_frames(log.frames(), out)} frames")
+            return
+    from .table_files import TableFiles
+    from .tables import codec_of, message_blocks, signal_blocks
+
+    wanted = set(what or _WHAT[:-1])
+    with open_mcap(logs, start, end) as log, TableFiles(out, kind) as files:
+        for block in message_blocks(log, wanted):
+            files.write(block)
+        if "signals" in wanted:
+            for block in signal_blocks(codec_of(log), log.frames()):
+                files.write(block)
+        for path, rows in files.rows.items():
+            click.echo(f"{path}: {rows} rows")
+        for damage in log.damage:
+            click.echo(f"{damage}", err=True)
+        if not files.rows:
+            raise LogError(f"{', '.join(str(path) for path in logs)}: nothing of {', '.join(sorted(wanted))} in it")
+
+
+def _frames(batches: object, out: Path) -> int:
+    import can
+
+    from ema.core.can_messages import message
+
+    if out.exists():
+        raise LogError(f"{out}: exists, and is not overwritten")
+    count = 0
+    try:
+        with can.Logger(out) as target:
+            for bus, frames in batches:  # type: ignore[attr-defined]
+                for frame in frames:
+                    target(message(frame, bus or None))
+                count += len(frames)
+    except OSError as error:
+        raise LogError(f"{out}: cannot be written ({error.strerror or error})") from error
+    except (ValueError, NotImplementedError, ImportError) as error:
+        raise LogError(f"{out}: {error}") from error
+    return count

@@ -1,0 +1,45 @@
+"""Logs named on the command line: MCAP segments as one, or raw logs of other tools."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from ema.core.errors import LogError
+from ema.log.foreign import SUFFIXES, ForeignLog
+from ema.log.reader import LogReader, find_logs
+
+from .times import TimeOption
+
+
+def open_log(paths: Iterable[Path], start: TimeOption = None, end: TimeOption = None) -> LogReader | ForeignLog:
+    """Open MCAP logs, or raw logs of other tools; not both at once.
+
+    Parameters
+    ----------
+    paths : paths
+        Files or directories.
+    start, end : functions of the first time [ns], optional
+        What `times.TimeParameter` gives.
+
+    Raises
+    ------
+    LogError
+        A file is missing, or of a kind that is not known.
+    """
+    found = find_logs(paths, (".mcap", *SUFFIXES))
+    kinds = {path.suffix.lower() == ".mcap" for path in found}
+    if len(kinds) > 1:
+        raise LogError("MCAP logs and logs of other tools cannot be read as one: name one kind only")
+    log: LogReader | ForeignLog = LogReader(found) if kinds == {True} else ForeignLog(found)
+    first_ns = log.first_ns() or 0
+    log.start_ns, log.end_ns = (None if t is None else t(first_ns) for t in (start, end))
+    return log
+
+
+def open_mcap(paths: Iterable[Path], start: TimeOption = None, end: TimeOption = None) -> LogReader:
+    """Open MCAP logs only. LogError as `open_log`."""
+    log = LogReader(find_logs(paths, (".mcap",)))
+    first_ns = log.first_ns() or 0
+    log.start_ns, log.end_ns = (None if t is None else t(first_ns) for t in (start, end))
+    return log
