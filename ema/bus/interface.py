@@ -15,6 +15,7 @@ from ema.core.errors import BusError
 
 from .port import Port
 from .python_can import PythonCanPort
+from .socketcan import SocketCanPort
 
 AUTO = "auto"
 GROUP = "239.74.163.2"  # python-can's own multicast group
@@ -64,6 +65,11 @@ def open_bus(settings: BusSettings) -> Port:
 def _open(settings: BusSettings) -> Port:
     interface, channel = settings.interface, settings.channel or _default_channel(settings.interface)
     name = f"{interface}:{channel}"
+    if interface == "socketcan":
+        try:
+            return SocketCanPort(channel, **settings.options)
+        except TypeError as error:
+            raise BusError(f"bus {name} cannot be opened ({error})") from error
     options: dict[str, Any] = {"fd": True} if interface != "virtual" else {"protocol": can.CanProtocol.CAN_FD}
     if interface == "udp_multicast":
         options["hop_limit"] = 0  # never leaves this machine

@@ -49,6 +49,7 @@ def test_kernel_counts_what_a_full_receive_buffer_drops(raw_can):
     n_received = 0
     while _readable(receiver):
         n_received += 1
+    receiver.settimeout(10)
     sender.send_frame(0, bytes(64))  # the count comes with the next frame
     _data, control, _flags, _address = receiver.recvmsg(72, 128)
     drops = [struct.unpack("=I", data)[0] for level, kind, data in control if kind == SO_RXQ_OVFL]
