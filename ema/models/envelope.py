@@ -32,5 +32,16 @@ def envelope(i_abc: np.ndarray, rate: float) -> np.ndarray:
     i : array, shape (..., n_times)
         Envelope. [A]
     """
+    return smoothed(rectified(i_abc), rate)
+
+
+def rectified(i_abc: np.ndarray) -> np.ndarray:
+    """DC-equivalent current before the low-pass.   ½ Σ |i_j|   (..., 3, n_times) → (..., n_times) [A]"""
+    half_sum: np.ndarray = 0.5 * np.abs(i_abc).sum(axis=-2)
+    return half_sum
+
+
+def smoothed(x: np.ndarray, rate: float) -> np.ndarray:
+    """The envelope's low-pass over the last axis, without phase shift, shape of `x`."""
     b, a = _filter(rate)
-    return np.asarray(filtfilt(b, a, 0.5 * np.abs(i_abc).sum(axis=-2), axis=-1))
+    return np.asarray(filtfilt(b, a, x, axis=-1))

@@ -1,0 +1,160 @@
+"""From everything on a bus to the cycles of each actuator: protection, then assembly, frame by frame in their order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ema.bus import identifiers
+from ema.bus.codec import Codec
+from ema.bus.header import sequence
+from ema.bus.protection import Receiver
+from ema.bus.stream import GOOD
+from ema.core.frames import FrameFlag
+from ema.models.actuator import Actuator
+
+from .assembly import Assembly, Due
+from .cycles import AssembledCycle, Span
+from .outputs import Event, Level
+from .settings import MonitorSettings
+
+RECEIVED = ("CycleStart", "CycleEnd", "PhaseCurrents", "Motion", "Supply")
+_CHIRP = 0  # motion_kind in the DBC
+
+
+class _Batch(NamedTuple):
+    """Checked frames with what is asked of them again and again."""
+
+    frames: np.ndarray
+    checks: np.ndarray
+    t_ns: np.ndarray
+    message: np.ndarray  # identifier of the DBC message
+    actuator: np.ndarray
+
+    def part(self, begin: int, end: int) -> _Batch:
+        return _Batch(*(column[begin:end] for column in self))
+
+
+class Assembler:
+    """Cycles of all actuators on one bus.
+
+    Parameters
+    ----------
+    codec : Codec
+    plants : mapping of actuator number to Actuator
+        Whose cycles are assembled; their test motion says how long a cycle is.
+    settings : MonitorSettings
+    """
+
+    def __init__(self, codec: Codec, plants: Mapping[int, Actuator], settings: MonitorSettings):
+        self.receiver = Receiver(codec, RECEIVED, plants)
+        self._codec = codec
+        self._plants = plants
+        ids = {name: codec.messages[name].frame_id for name in RECEIVED}
+        self._start, self._end, self._currents, self._motion, _ = ids.values()
+        timeout_ns, grace_ns = round(settings.timeout * 1e9), round(settings.grace * 1e9)
+        self._assemblies = {
+            number: Assembly(codec, number, plant.n_samples, timeout_ns, grace_ns) for number, plant in plants.items()
+        }
+
+    def feed(self, frames: np.ndarray) -> Iterator[AssembledCycle | Event]:
+        """Take frames in the order they were received, shape (n,); cycles as they close, and what was odd."""
+        batch = self._checked(frames)
+        marks = (batch.checks <= GOOD) & ((batch.message == self._start) | (batch.message == self._end))
+        begin = 0
+        for mark in [*np.flatnonzero(marks).tolist(), None]:
+            end = len(batch.frames) if mark is None else mark + 1
+            yield from self._place(batch.part(begin, end))
+            if mark is not None:
+                yield from self._mark(batch.part(mark, end))
+            begin = end
+
+    def finish(self) -> Iterator[AssembledCycle | Event]:
+        """Close what is open, because no more frames will come."""
+        for assembly in self._assemblies.values():
+            for cycle in assembly.finish():
+                yield from self._closed(assembly, cycle)
+
+    def _checked(self, frames: np.ndarray) -> _Batch:
+        frames = frames[(frames["flags"] & (FrameFlag.TX | FrameFlag.ERROR)) == 0]
+        ids = frames["id"]
+        checks = self.receiver.check(frames)
+        return _Batch(
+            frames, checks, frames["t_ns"].astype(np.int64), identifiers.message_id(ids), identifiers.actuator(ids)
+        )
+
+    def _place(self, batch: _Batch) -> Iterator[AssembledCycle | Event]:
+        """Place frames; a cycle whose time runs out, or whose last frame comes, is closed at that frame."""
+        while True:
+            due, assembly = self._first_due(batch)
+            taken = batch if due is None else batch.part(0, due.n_taken)
+            self._take(taken)
+            if due is None or assembly is None:
+                return
+            yield from self._closed(assembly, assembly.close(due.t_ns, due.reasons))
+            batch = batch.part(due.n_taken, len(batch.frames))
+
+    def _first_due(self, batch: _Batch) -> tuple[Due | None, Assembly | None]:
+        first: tuple[Due | None, Assembly | None] = (None, None)
+        open_ones = [assembly for assembly in self._assemblies.values() if assembly.open]
+        if not open_ones or not batch.frames.size:
+            return first
+        currents = (batch.message == self._currents) & (batch.checks <= GOOD)
+        numbers = sequence(batch.frames)
+        for assembly in open_ones:
+            due = assembly.due(batch.t_ns, currents & (batch.actuator == assembly.actuator), numbers)
+            if due is not None and (first[0] is None or due.n_taken < first[0].n_taken):
+                first = due, assembly
+        return first
+
+    def _take(self, batch: _Batch) -> None:
+        if not batch.frames.size:
+            return
+        currents = batch.message == self._currents
+        motions = (batch.message == self._motion) & (batch.checks <= GOOD)
+        for number, assembly in self._assemblies.items():
+            own = batch.actuator == number
+            if own.any():
+                mine = own & currents
+                assembly.place(batch.frames[mine], batch.checks[mine], batch.frames[own & motions])
+
+    def _mark(self, mark: _Batch) -> Iterator[AssembledCycle | Event]:
+        """A good CycleStart or CycleEnd."""
+        starts = int(mark.message[0]) == self._start
+        values = self._codec.messages["CycleStart" if starts else "CycleEnd"].decode(mark.frames)
+        span = Span(**{name: values[name][0].item() for name in Span._fields})
+        t_ns, number = int(mark.t_ns[0]), int(mark.actuator[0])
+        assembly = self._assemblies[number]
+        odd = _misfit(span, self._plants[number])
+        if odd:
+            if assembly.closed != span.cycle:
+                yield Event(t_ns, Level.WARNING, "other_motion", f"cycle {span.cycle} is not looked at: {odd}", number)
+            cycles = assembly.skip(span.cycle, t_ns)
+        else:
+            cycles = assembly.start(span, t_ns) if starts else assembly.end(span, t_ns)
+        for cycle in cycles:
+            yield from self._closed(assembly, cycle)
+
+    def _closed(self, assembly: Assembly, cycle: AssembledCycle) -> Iterator[AssembledCycle | Event]:
+        previous, number = assembly.previous, cycle.span.cycle
+        if previous is not None and number != previous + 1:
+            text = (
+                f"cycles {previous + 1}…{number - 1} were not seen" if number > previous + 1
+                else f"cycle {number} follows cycle {previous}: the actuator has restarted"
+            )  # fmt: skip
+            yield Event(cycle.t_ns, Level.WARNING, "cycles_missing", text, assembly.actuator)
+        yield cycle
+
+
+def _misfit(span: Span, plant: Actuator) -> str:
+    """What of a cycle is not the plant's test motion; empty if it is."""
+    period = 1.0 / plant.control.rate
+    if span.motion_kind != _CHIRP:
+        return f"its motion is of kind {span.motion_kind}, the bundle's is a chirp ({_CHIRP})"
+    if span.n_samples != plant.n_samples:
+        return f"it has {span.n_samples} samples, the bundle's has {plant.n_samples}"
+    if abs(span.period - period) > 1e-6 * period:
+        return f"its sampling period is {span.period:g} s, the bundle's is {period:g} s"
+    return ""

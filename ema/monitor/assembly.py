@@ -1,0 +1,197 @@
+"""Cycle assembly of one actuator: from frames that passed the protection, in their order, to cycles.
+
+A cycle is closed by CycleEnd, by the CycleStart of the next one, or when its frames stop coming. Time is that of the
+frames themselves: the same frames in the same order give the same cycles, live or replayed, in batches of any size.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ema.bus.codec import Codec
+from ema.bus.header import N_SEQUENCES
+from ema.bus.stream import GOOD, Check
+from ema.core.status import Reason
+
+from .cycles import SAMPLES_PER_FRAME, AssembledCycle, Span, Tally
+from .track import Track
+
+NEVER = np.iinfo(np.int64).max
+
+
+class Due(NamedTuple):
+    """An open cycle is to be closed after the first `n_taken` frames of a batch, at `t_ns`."""
+
+    n_taken: int
+    t_ns: int
+    reasons: Reason
+
+
+class Assembly:
+    """Cycles of one actuator.
+
+    Parameters
+    ----------
+    codec : Codec
+    actuator : int
+    n_samples : int
+        Current samples of a cycle; cycles of another length are not assembled.
+    timeout_ns, grace_ns : int
+        See MonitorSettings. [ns]
+    """
+
+    def __init__(self, codec: Codec, actuator: int, n_samples: int, timeout_ns: int, grace_ns: int):
+        self.actuator = actuator
+        self.n_samples = n_samples
+        self._codec = codec
+        self._timeout_ns, self._grace_ns = timeout_ns, grace_ns
+        plan = Span(0, 0, 0, n_samples, 0.0, 0)
+        self._currents, self._motions = Track(plan.n_currents), Track(plan.n_motions)
+        self._checks = np.zeros(len(Check), int)  # of PhaseCurrents since the last cycle was closed, by check
+        self._dropped = False
+        self._span: Span | None = None
+        self._reasons = Reason(0)
+        self._latest_ns = 0  # of the open cycle's frames
+        self._end_ns = NEVER  # when CycleEnd came, if frames are still waited for
+        self.closed: int | None = None  # number of the last cycle closed or skipped
+        self.previous: int | None = None  # of the one before it
+
+    @property
+    def open(self) -> bool:
+        """Whether a cycle is open."""
+        return self._span is not None
+
+    def place(self, currents: np.ndarray, checks: np.ndarray, motions: np.ndarray) -> None:
+        """Take frames of PhaseCurrents with their checks, and good ones of Motion."""
+        self._checks += np.bincount(checks, minlength=len(Check))
+        good = currents[checks <= GOOD]
+        self._currents.put(good)
+        self._motions.put(motions)
+        if good.size:
+            self._latest_ns = max(self._latest_ns, int(good["t_ns"].max()))
+
+    def note_drop(self) -> None:
+        """The kernel dropped frames, of whom is not known."""
+        self._dropped = True
+
+    def due(self, t_ns: np.ndarray, own: np.ndarray, numbers: np.ndarray) -> Due | None:
+        """When a batch closes the open cycle, other than by a cycle's start or end.
+
+        Parameters
+        ----------
+        t_ns : array, shape (n,)
+            Times of all frames on the bus.
+        own : array of bool, shape (n,)
+            Which are good frames of this actuator's PhaseCurrents.
+        numbers : array, shape (n,)
+            Their sequence numbers.
+        """
+        if self._span is None or not t_ns.size:
+            return None
+        latest = np.maximum.accumulate(np.where(own, t_ns, self._latest_ns))
+        before = np.concatenate(([self._latest_ns], np.maximum(latest[:-1], self._latest_ns)))
+        limit = np.minimum(before + self._timeout_ns, self._end_ns)
+        late = _first(t_ns > limit)
+        if self._end_ns < NEVER:
+            complete = _first(own & (numbers == self._span.last_current % N_SEQUENCES))
+            if complete < late:
+                return Due(complete + 1, int(t_ns[complete]), Reason(0))
+        if late < t_ns.size:
+            ended = self._end_ns < NEVER
+            return Due(late, int(t_ns[late]), Reason(0) if ended else Reason.TIMEOUT | Reason.NO_END)
+        return None
+
+    def start(self, span: Span, t_ns: int) -> list[AssembledCycle]:
+        """CycleStart: the cycle it closes, if any."""
+        if self._span is not None and self._span.cycle == span.cycle:
+            return []
+        cycles = self._interrupt(t_ns)
+        self._begin(span, t_ns)
+        return cycles
+
+    def end(self, span: Span, t_ns: int) -> list[AssembledCycle]:
+        """CycleEnd: the cycles it closes."""
+        cycles = self._interrupt(t_ns) if self._span is not None and self._span.cycle != span.cycle else []
+        if self._span is None:
+            if self.closed == span.cycle:
+                return cycles
+            self._begin(span, t_ns)
+            self._reasons |= Reason.NO_START
+        self._span = span
+        if self._currents.has(span.last_current % N_SEQUENCES):
+            cycles.append(self.close(t_ns))
+        else:
+            self._end_ns = t_ns + self._grace_ns
+        return cycles
+
+    def skip(self, number: int, t_ns: int) -> list[AssembledCycle]:
+        """A cycle that is not to be assembled begins or ends: the cycle it closes, if any."""
+        cycles = self._interrupt(t_ns)
+        self.previous, self.closed = self.closed, number
+        return cycles
+
+    def finish(self) -> list[AssembledCycle]:
+        """No more frames will come: the open cycle, if any."""
+        return self._interrupt(self._latest_ns)
+
+    def close(self, t_ns: int, reasons: Reason = Reason(0)) -> AssembledCycle:
+        """Close the open cycle."""
+        span = self._span
+        assert span is not None
+        self._span, self._end_ns = None, NEVER
+        self.previous, self.closed = self.closed, span.cycle
+        currents, present = self._currents.take(span.first_current, span.n_currents)
+        tally = self._take_tally(int((~present).sum()))
+        i = self._codec.messages["PhaseCurrents"].decode(currents)
+        dropped, self._dropped = self._dropped, False
+        return AssembledCycle(
+            t_ns=t_ns,
+            actuator=self.actuator,
+            span=span,
+            i=np.stack([i[f"i_{phase}"].ravel()[: span.n_samples] for phase in "abc"]),
+            missing=np.repeat(~present, SAMPLES_PER_FRAME)[: span.n_samples],
+            motion=self._motion(span),
+            tally=tally,
+            reasons=self._reasons | reasons | _seen(tally) | (Reason.KERNEL_DROPS if dropped else Reason(0)),
+        )
+
+    def _interrupt(self, t_ns: int) -> list[AssembledCycle]:
+        if self._span is None:
+            return []
+        return [self.close(t_ns, Reason(0) if self._end_ns < NEVER else Reason.NO_END)]
+
+    def _begin(self, span: Span, t_ns: int) -> None:
+        self._span, self._reasons, self._latest_ns = span, Reason(0), t_ns
+
+    def _take_tally(self, n_lost: int) -> Tally:
+        n = self._checks
+        bad = n[Check.CRC_ERROR] + n[Check.WRONG_LENGTH] + n[Check.WRONG_COUNTER]
+        tally = Tally(n_lost, int(n[Check.REORDERED]), int(n[Check.REPEATED]), int(bad))
+        self._checks = np.zeros_like(n)
+        return tally
+
+    def _motion(self, span: Span) -> dict[str, np.ndarray]:
+        frames, present = self._motions.take(span.first_motion, span.n_motions)
+        values = self._codec.messages["Motion"].decode(frames)
+        return {
+            name: np.where(present[:, None], x, np.nan).ravel()[: span.n_motion_samples] for name, x in values.items()
+        }
+
+
+def _first(condition: np.ndarray) -> int:
+    """Index of the first true element; the length if there is none."""
+    index = int(condition.argmax()) if condition.size else 0
+    return index if condition.size and condition[index] else condition.size
+
+
+def _seen(tally: Tally) -> Reason:
+    reasons = Reason(0)
+    for count, reason in zip(
+        tally,
+        (Reason.LOST_FRAMES, Reason.REORDERED_FRAMES, Reason.REPEATED_FRAMES, Reason.CORRUPT_FRAMES),
+        strict=True,
+    ):
+        reasons |= reason if count else Reason(0)
+    return reasons

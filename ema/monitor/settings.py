@@ -1,0 +1,37 @@
+"""How the monitor closes cycles, when slower identifiers run, and when it doubts its model."""
+
+from __future__ import annotations
+
+from pydantic import Field, model_validator
+
+from ema.core.config import Settings
+from ema.core.units import quantity
+
+
+class Slower(Settings):
+    """An identifier that does not run in every cycle."""
+
+    every: quantity("s", "one cycle is chosen in each interval of this length, by the frames' own time", ge=0.01)  # type: ignore[valid-type]
+
+
+class ModelCheck(Settings):
+    """The model is in doubt when the residuals of several cycles are larger than its noise explains."""
+
+    level: float = Field(default=1e-3, gt=0, lt=1, description="p-value of the residual below which a cycle speaks against it")
+    cycles: int = Field(default=5, ge=1, le=1000, description="how many of the last cycles are looked at")
+    failures: int = Field(default=3, ge=1, description="so many of them against it put it in doubt; none clears it")
+
+    @model_validator(mode="after")
+    def _possible(self) -> ModelCheck:
+        if self.failures > self.cycles:
+            raise ValueError(f"failures = {self.failures} can never happen in {self.cycles} cycles")
+        return self
+
+
+class MonitorSettings(Settings):
+    """Section `monitor` of the daemon's configuration."""
+
+    timeout: quantity("s", "a cycle whose frames stop coming for this long is closed", gt=0, le=60) = 0.3  # type: ignore[valid-type]
+    grace: quantity("s", "after CycleEnd this long is waited for frames that it overtook", ge=0, le=1) = 0.01  # type: ignore[valid-type]
+    slower: dict[str, Slower] = Field(default_factory=lambda: {"lf2": Slower(every=5.0)}, description="by identifier")
+    model_check: ModelCheck = ModelCheck()
