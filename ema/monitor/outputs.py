@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from ema.core.status import Reason, Status
+from ema.core.status import Reason
 from ema.identification import Estimate, Measurement
 
 
@@ -32,14 +32,13 @@ class Event:
 
 @dataclass(frozen=True)
 class Job:
-    """A cycle for a slower identifier: what it needs, and what the bus said of the cycle."""
+    """A cycle for an identifier: what it needs, and what went wrong on the bus."""
 
     t_ns: int
     actuator: int
     cycle: int
     method: str
     measurement: Measurement
-    status: Status
     reasons: Reason
 
 

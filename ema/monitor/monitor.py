@@ -1,0 +1,136 @@
+"""The monitor: frames in, answers out. No I/O, no clock: driven alike by the live bus, by a log and by tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ema.bundle import Bundle
+from ema.bus.codec import Codec
+from ema.bus.protection import Counts
+from ema.core.errors import ConfigError
+from ema.core.status import Reason, Status
+from ema.identification import METHODS, Estimate, identifier
+
+from .assembler import Assembler
+from .cycles import AssembledCycle
+from .doubt import ModelDoubt
+from .outputs import Event, Identified, Job, Level, Output, SampledEnvelope
+from .sampling import Sampler
+from .settings import MonitorSettings
+
+FIRST = "linear"  # the identifier of every cycle
+_DEGRADING = Reason.LOST_FRAMES | Reason.SATURATED | Reason.START_STATE_UNKNOWN | Reason.MODEL_IN_DOUBT
+
+
+class _Channel:
+    """What the monitor keeps of one actuator."""
+
+    def __init__(self, bundle: Bundle, settings: MonitorSettings):
+        self.t = bundle.t[bundle.schedule]
+        self.noise = bundle.noise(FIRST)
+        self.sampler = Sampler(bundle.plant, bundle.schedule)
+        self.identifier = identifier(FIRST, bundle)
+        self.doubts = {method: ModelDoubt(settings.model_check) for method in (FIRST, *settings.slower)}
+        self.chosen = dict.fromkeys(settings.slower, -1)  # interval of the last cycle chosen
+
+
+class Monitor:
+    """Estimates the faults of several actuators from the frames on one bus.
+
+    Parameters
+    ----------
+    bundles : mapping of actuator number to Bundle
+    codec : Codec
+    settings : MonitorSettings
+
+    Attributes
+    ----------
+    n_cycles, n_estimates : int
+        Cycles closed, and those of them with an estimate that is valid or degraded.
+    """
+
+    def __init__(self, bundles: Mapping[int, Bundle], codec: Codec, settings: MonitorSettings):
+        unknown = sorted(set(settings.slower) - (set(METHODS) - {FIRST}))
+        if unknown:
+            known = ", ".join(sorted(set(METHODS) - {FIRST}))
+            raise ConfigError(f"monitor.slower: identifier '{unknown[0]}' is unknown; known: {known}")
+        self._settings = settings
+        self._channels = {number: _Channel(bundle, settings) for number, bundle in bundles.items()}
+        self._assembler = Assembler(codec, {number: b.plant for number, b in bundles.items()}, settings)
+        self.n_cycles = self.n_estimates = 0
+
+    @property
+    def counts(self) -> Counts:
+        """What happened to frames since the start."""
+        return self._assembler.receiver.counts
+
+    def update(self, frames: np.ndarray) -> list[Output]:
+        """Take frames in the order they were received, shape (n,), FRAME_DTYPE; in batches of any size."""
+        return list(self._answers(self._assembler.feed(frames)))
+
+    def finish(self) -> list[Output]:
+        """No more frames will come: close what is open."""
+        return list(self._answers(self._assembler.finish()))
+
+    def conclude(self, job: Job, estimate: Estimate) -> list[Output]:
+        """Take the answer to a job; those of one method in the order of their jobs."""
+        return list(self._concluded(job, estimate))
+
+    def _answers(self, seen: Iterator[AssembledCycle | Event]) -> Iterator[Output]:
+        for item in seen:
+            if isinstance(item, AssembledCycle):
+                yield from self._answer(item)
+            else:
+                yield item
+
+    def _answer(self, cycle: AssembledCycle) -> Iterator[Output]:
+        channel = self._channels[cycle.actuator]
+        measurement = channel.sampler.measurement(cycle)
+        reasons = cycle.reasons
+        if channel.sampler.saturated(cycle):
+            reasons |= Reason.SATURATED
+        job = Job(cycle.t_ns, cycle.actuator, cycle.span.cycle, FIRST, measurement, reasons)
+        estimate = channel.identifier.estimate(measurement)
+        outputs = list(self._concluded(job, estimate))
+        self.n_cycles += 1
+        usable = any(isinstance(o, Identified) and o.estimate.status <= Status.DEGRADED for o in outputs)
+        self.n_estimates += usable
+        yield from outputs
+        yield _sampled(channel, job, estimate)
+        if usable:
+            yield from self._jobs(channel, job)
+
+    def _concluded(self, job: Job, estimate: Estimate) -> Iterator[Output]:
+        doubt = self._channels[job.actuator].doubts[job.method]
+        changed = doubt.update(job.cycle, estimate.p_value)
+        reasons = estimate.reasons | job.reasons
+        if doubt.doubted:
+            reasons |= Reason.MODEL_IN_DOUBT
+        status = max(estimate.status, Status.DEGRADED if reasons & _DEGRADING else Status.VALID)
+        yield Identified(job.t_ns, job.actuator, job.cycle, replace(estimate, status=status, reasons=reasons))
+        if changed and doubt.doubted:
+            text = f"{job.method}: the residuals of cycles {', '.join(map(str, doubt.cycles))} are larger than the noise explains"
+            yield Event(job.t_ns, Level.WARNING, "model_in_doubt", text, job.actuator)
+        elif changed:
+            text = f"{job.method}: the residuals are explained by the noise again, up to cycle {job.cycle}"
+            yield Event(job.t_ns, Level.INFO, "model_trusted", text, job.actuator)
+
+    def _jobs(self, channel: _Channel, first: Job) -> Iterator[Job]:
+        """The first usable cycle of every interval, by the frames' own time: live and replay choose the same."""
+        for method, slower in self._settings.slower.items():
+            interval = first.t_ns // round(slower.every * 1e9)
+            if interval != channel.chosen[method]:
+                channel.chosen[method] = interval
+                yield replace(first, method=method)
+
+
+def _sampled(channel: _Channel, job: Job, estimate: Estimate) -> SampledEnvelope:
+    measured = np.where(job.measurement.valid, job.measurement.i_hat, np.nan)
+    if np.isnan(estimate.k).any():
+        sd = np.full(measured.shape, np.nan)
+    else:
+        sd = np.sqrt(np.diag(channel.noise.covariance(job.measurement.start, estimate.k)))
+    return SampledEnvelope(job.t_ns, job.actuator, job.cycle, channel.t, measured, measured - estimate.residual, sd)
