@@ -43,3 +43,26 @@ def pack(frames: np.ndarray) -> bytes:
 def unpack(raw: bytes) -> np.ndarray:
     """Frames from `pack`ed bytes; ValueError when the bytes are not a whole number of frames."""
     return np.frombuffer(raw, FRAME_DTYPE)
+
+
+# linux/can/error.h: the class "controller problem" of an error frame, and in its second byte "receive overflow".
+_ERR_CRTL, _RX_OVERFLOW = 0x004, 0x01
+
+
+def overflow_notice(t_ns: int) -> np.ndarray:
+    """The error frame by which a controller says that frames were dropped on reception, shape (1,).
+
+    The ports' callers put one in the place of frames the kernel dropped, so that a log tells it where it happened.
+    """
+    notice = empty(1)
+    notice["t_ns"], notice["id"], notice["length"] = t_ns, _ERR_CRTL, 8
+    notice["flags"] = int(FrameFlag.ERROR)
+    notice["data"][0, 1] = _RX_OVERFLOW
+    return notice
+
+
+def is_overflow(frames: np.ndarray) -> np.ndarray:
+    """Which frames say that others were dropped on reception, shape of `frames`."""
+    error = (frames["flags"] & int(FrameFlag.ERROR)) != 0
+    crtl: np.ndarray = error & ((frames["id"] & _ERR_CRTL) != 0) & ((frames["data"][..., 1] & _RX_OVERFLOW) != 0)
+    return crtl

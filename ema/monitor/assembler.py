@@ -11,8 +11,8 @@ from ema.bus import identifiers
 from ema.bus.codec import Codec
 from ema.bus.header import sequence
 from ema.bus.protection import Receiver
-from ema.bus.stream import GOOD
-from ema.core.frames import FrameFlag
+from ema.bus.stream import GOOD, Check
+from ema.core.frames import FrameFlag, is_overflow
 from ema.models.actuator import Actuator
 
 from .assembly import Assembly, Due
@@ -20,6 +20,7 @@ from .cycles import AssembledCycle, Span
 from .outputs import Event, Level
 from .settings import MonitorSettings
 
+_ERROR, _TX = int(FrameFlag.ERROR), int(FrameFlag.TX)
 RECEIVED = ("CycleStart", "CycleEnd", "PhaseCurrents", "Motion", "Supply")
 _CHIRP = 0  # motion_kind in the DBC
 
@@ -62,7 +63,8 @@ class Assembler:
     def feed(self, frames: np.ndarray) -> Iterator[AssembledCycle | Event]:
         """Take frames in the order they were received, shape (n,); cycles as they close, and what was odd."""
         batch = self._checked(frames)
-        marks = (batch.checks <= GOOD) & ((batch.message == self._start) | (batch.message == self._end))
+        bounds = (batch.checks <= GOOD) & ((batch.message == self._start) | (batch.message == self._end))
+        marks = bounds | is_overflow(batch.frames)
         begin = 0
         for mark in [*np.flatnonzero(marks).tolist(), None]:
             end = len(batch.frames) if mark is None else mark + 1
@@ -77,13 +79,20 @@ class Assembler:
             for cycle in assembly.finish():
                 yield from self._closed(assembly, cycle)
 
+    def time_outs(self, now_ns: int) -> list[tuple[str, int]]:
+        """See Monitor."""
+        late = self.receiver.time_outs(now_ns)
+        return [(self._codec.find(i).name, identifiers.actuator(i)) for i in late]  # type: ignore[union-attr]
+
     def _checked(self, frames: np.ndarray) -> _Batch:
-        frames = frames[(frames["flags"] & (FrameFlag.TX | FrameFlag.ERROR)) == 0]
+        flags = frames["flags"]
+        frames = frames[((flags & _TX) == 0) & (((flags & _ERROR) == 0) | is_overflow(frames))]
+        data = (frames["flags"] & _ERROR) == 0
+        checks = np.full(frames.size, Check.FOREIGN, np.uint8)
+        checks[data] = self.receiver.check(frames[data])
         ids = frames["id"]
-        checks = self.receiver.check(frames)
-        return _Batch(
-            frames, checks, frames["t_ns"].astype(np.int64), identifiers.message_id(ids), identifiers.actuator(ids)
-        )
+        t_ns = frames["t_ns"].astype(np.int64)
+        return _Batch(frames, checks, t_ns, identifiers.message_id(ids), identifiers.actuator(ids))
 
     def _place(self, batch: _Batch) -> Iterator[AssembledCycle | Event]:
         """Place frames; a cycle whose time runs out, or whose last frame comes, is closed at that frame."""
@@ -121,7 +130,11 @@ class Assembler:
                 assembly.place(batch.frames[mine], batch.checks[mine], batch.frames[own & motions])
 
     def _mark(self, mark: _Batch) -> Iterator[AssembledCycle | Event]:
-        """A good CycleStart or CycleEnd."""
+        """A good CycleStart or CycleEnd, or the notice that frames were dropped."""
+        if mark.checks[0] == Check.FOREIGN:
+            for assembly in self._assemblies.values():
+                assembly.note_drop()
+            return
         starts = int(mark.message[0]) == self._start
         values = self._codec.messages["CycleStart" if starts else "CycleEnd"].decode(mark.frames)
         span = Span(**{name: values[name][0].item() for name in Span._fields})

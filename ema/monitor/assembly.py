@@ -19,6 +19,7 @@ from .cycles import SAMPLES_PER_FRAME, AssembledCycle, Span, Tally
 from .track import Track
 
 NEVER = np.iinfo(np.int64).max
+_NOTHING = Reason(0)
 
 
 class Due(NamedTuple):
@@ -52,7 +53,7 @@ class Assembly:
         self._checks = np.zeros(len(Check), int)  # of PhaseCurrents since the last cycle was closed, by check
         self._dropped = False
         self._span: Span | None = None
-        self._reasons = Reason(0)
+        self._reasons = _NOTHING
         self._latest_ns = 0  # of the open cycle's frames
         self._end_ns = NEVER  # when CycleEnd came, if frames are still waited for
         self.closed: int | None = None  # number of the last cycle closed or skipped
@@ -97,10 +98,10 @@ class Assembly:
         if self._end_ns < NEVER:
             complete = _first(own & (numbers == self._span.last_current % N_SEQUENCES))
             if complete < late:
-                return Due(complete + 1, int(t_ns[complete]), Reason(0))
+                return Due(complete + 1, int(t_ns[complete]), _NOTHING)
         if late < t_ns.size:
             ended = self._end_ns < NEVER
-            return Due(late, int(t_ns[late]), Reason(0) if ended else Reason.TIMEOUT | Reason.NO_END)
+            return Due(late, int(t_ns[late]), _NOTHING if ended else Reason.TIMEOUT | Reason.NO_END)
         return None
 
     def start(self, span: Span, t_ns: int) -> list[AssembledCycle]:
@@ -136,7 +137,7 @@ class Assembly:
         """No more frames will come: the open cycle, if any."""
         return self._interrupt(self._latest_ns)
 
-    def close(self, t_ns: int, reasons: Reason = Reason(0)) -> AssembledCycle:
+    def close(self, t_ns: int, reasons: Reason = _NOTHING) -> AssembledCycle:
         """Close the open cycle."""
         span = self._span
         assert span is not None
@@ -154,16 +155,16 @@ class Assembly:
             missing=np.repeat(~present, SAMPLES_PER_FRAME)[: span.n_samples],
             motion=self._motion(span),
             tally=tally,
-            reasons=self._reasons | reasons | _seen(tally) | (Reason.KERNEL_DROPS if dropped else Reason(0)),
+            reasons=self._reasons | reasons | _seen(tally) | (Reason.KERNEL_DROPS if dropped else _NOTHING),
         )
 
     def _interrupt(self, t_ns: int) -> list[AssembledCycle]:
         if self._span is None:
             return []
-        return [self.close(t_ns, Reason(0) if self._end_ns < NEVER else Reason.NO_END)]
+        return [self.close(t_ns, _NOTHING if self._end_ns < NEVER else Reason.NO_END)]
 
     def _begin(self, span: Span, t_ns: int) -> None:
-        self._span, self._reasons, self._latest_ns = span, Reason(0), t_ns
+        self._span, self._reasons, self._latest_ns = span, _NOTHING, t_ns
 
     def _take_tally(self, n_lost: int) -> Tally:
         n = self._checks
@@ -187,11 +188,11 @@ def _first(condition: np.ndarray) -> int:
 
 
 def _seen(tally: Tally) -> Reason:
-    reasons = Reason(0)
+    reasons = _NOTHING
     for count, reason in zip(
         tally,
         (Reason.LOST_FRAMES, Reason.REORDERED_FRAMES, Reason.REPEATED_FRAMES, Reason.CORRUPT_FRAMES),
         strict=True,
     ):
-        reasons |= reason if count else Reason(0)
+        reasons |= reason if count else _NOTHING
     return reasons

@@ -67,6 +67,10 @@ class Monitor:
         """What happened to frames since the start."""
         return self._assembler.receiver.counts
 
+    def time_outs(self, now_ns: int) -> list[tuple[str, int]]:
+        """Messages that are sent at a period and did not come in time, with their actuators; each told once."""
+        return self._assembler.time_outs(now_ns)
+
     def update(self, frames: np.ndarray) -> list[Output]:
         """Take frames in the order they were received, shape (n,), FRAME_DTYPE; in batches of any size."""
         return list(self._answers(self._assembler.feed(frames)))
@@ -111,12 +115,8 @@ class Monitor:
             reasons |= Reason.MODEL_IN_DOUBT
         status = max(estimate.status, Status.DEGRADED if reasons & _DEGRADING else Status.VALID)
         yield Identified(job.t_ns, job.actuator, job.cycle, replace(estimate, status=status, reasons=reasons))
-        if changed and doubt.doubted:
-            text = f"{job.method}: the residuals of cycles {', '.join(map(str, doubt.cycles))} are larger than the noise explains"
-            yield Event(job.t_ns, Level.WARNING, "model_in_doubt", text, job.actuator)
-        elif changed:
-            text = f"{job.method}: the residuals are explained by the noise again, up to cycle {job.cycle}"
-            yield Event(job.t_ns, Level.INFO, "model_trusted", text, job.actuator)
+        if changed:
+            yield _judgement(job, doubt)
 
     def _jobs(self, channel: _Channel, first: Job) -> Iterator[Job]:
         """The first usable cycle of every interval, by the frames' own time: live and replay choose the same."""
@@ -134,3 +134,12 @@ def _sampled(channel: _Channel, job: Job, estimate: Estimate) -> SampledEnvelope
     else:
         sd = np.sqrt(np.diag(channel.noise.covariance(job.measurement.start, estimate.k)))
     return SampledEnvelope(job.t_ns, job.actuator, job.cycle, channel.t, measured, measured - estimate.residual, sd)
+
+
+def _judgement(job: Job, doubt: ModelDoubt) -> Event:
+    if doubt.doubted:
+        cycles = ", ".join(map(str, doubt.cycles))
+        text = f"{job.method}: the residuals of cycles {cycles} are larger than the noise explains"
+        return Event(job.t_ns, Level.WARNING, "model_in_doubt", text, job.actuator)
+    text = f"{job.method}: the noise explains the residuals again, last of cycle {job.cycle}"
+    return Event(job.t_ns, Level.INFO, "model_trusted", text, job.actuator)

@@ -11,15 +11,15 @@ from ema.core.units import quantity
 class Slower(Settings):
     """An identifier that does not run in every cycle."""
 
-    every: quantity("s", "one cycle is chosen in each interval of this length, by the frames' own time", ge=0.01)  # type: ignore[valid-type]
+    every: float = quantity("s", "one cycle is chosen in each interval of this length, by the frames' time", ge=0.01)
 
 
 class ModelCheck(Settings):
     """The model is in doubt when the residuals of several cycles are larger than its noise explains."""
 
-    level: float = Field(default=1e-3, gt=0, lt=1, description="p-value of the residual below which a cycle speaks against it")
+    level: float = quantity("", "p-value of a residual below which its cycle speaks against it", 1e-3, gt=0, lt=1)
     cycles: int = Field(default=5, ge=1, le=1000, description="how many of the last cycles are looked at")
-    failures: int = Field(default=3, ge=1, description="so many of them against it put it in doubt; none clears it")
+    failures: int = Field(default=3, ge=1, description="so many of them put the model in doubt; none clears it")
 
     @model_validator(mode="after")
     def _possible(self) -> ModelCheck:
@@ -31,7 +31,7 @@ class ModelCheck(Settings):
 class MonitorSettings(Settings):
     """Section `monitor` of the daemon's configuration."""
 
-    timeout: quantity("s", "a cycle whose frames stop coming for this long is closed", gt=0, le=60) = 0.3  # type: ignore[valid-type]
-    grace: quantity("s", "after CycleEnd this long is waited for frames that it overtook", ge=0, le=1) = 0.01  # type: ignore[valid-type]
-    slower: dict[str, Slower] = Field(default_factory=lambda: {"lf2": Slower(every=5.0)}, description="by identifier")
+    timeout: float = quantity("s", "a cycle whose frames stop coming for this long is closed", 0.3, gt=0, le=60)
+    grace: float = quantity("s", "how long CycleEnd waits for frames that it has overtaken", 0.01, ge=0, le=1)
+    slower: dict[str, Slower] = Field(default={"lf2": Slower(every=5.0)}, description="by identifier")
     model_check: ModelCheck = ModelCheck()

@@ -1,0 +1,54 @@
+"""The service put together from its configuration; everything that can be refused is refused here, before it starts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import yaml
+
+from ema.bundle import Bundle
+from ema.bus.codec import default
+from ema.bus.interface import open_bus
+from ema.log import LogSettings, LogWriter
+from ema.monitor import Monitor, Runner
+
+from .service import Service
+from .settings import DaemonSettings, load_bundles
+from .worker import Worker
+
+
+@contextmanager
+def assembled(settings: DaemonSettings) -> Iterator[Service]:
+    """A service ready to run; afterwards bus and log are closed.
+
+    Raises
+    ------
+    ConfigError, BundleError, BusError, LogError
+        One line each.
+    """
+    codec = default()
+    bundles = load_bundles(settings)
+    monitor = Monitor(bundles, codec, settings.monitor)
+    runner = Runner(bundles)
+    attachments: dict[str, bytes | Path] = {
+        codec.path.name: codec.path,
+        "daemon.yaml": yaml.safe_dump(settings.model_dump(mode="json"), allow_unicode=True, sort_keys=False).encode(),
+        **_manifests(bundles),
+    }
+    log_settings = LogSettings(**settings.log.model_dump(exclude={"directory"}))
+    with ExitStack() as stack:
+        log = stack.enter_context(LogWriter(settings.log.directory, attachments, log_settings))
+        port = stack.enter_context(open_bus(settings.bus))
+        workers = {method: Worker(runner.run, settings.queue, method) for method in settings.monitor.slower}
+        yield Service(monitor, port, log, codec, workers, settings.pace)
+
+
+def _manifests(bundles: dict[int, Bundle]) -> dict[str, bytes]:
+    """Manifests by name: one, or one for each actuator where their bundles differ."""
+    texts = {number: json.dumps(b.manifest, indent=1, ensure_ascii=False).encode() for number, b in bundles.items()}
+    if len(set(texts.values())) == 1:
+        return {"manifest.json": next(iter(texts.values()))}
+    return {f"manifest-{number}.json": text for number, text in texts.items()}

@@ -1,0 +1,46 @@
+"""`ema daemon`: the monitor as a service."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+@click.command(short_help="The monitor: bus → fault estimates on the bus and in the log.")
+@click.option("--config", "config_path", required=True, type=click.Path(path_type=Path), help="daemon YAML")
+@click.option("--bus", metavar="BUS", help="instead of the configuration's: auto, vcan0, udp_multicast …")
+@click.option("--log", "log_path", metavar="DIR", help="instead of the configuration's log directory")
+def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
+    """Watch the actuators on a bus until SIGTERM or SIGINT.
+
+    \b
+    Example:
+      ema daemon --config config/daemon.yaml --bus vcan0
+    """
+    # Thirty equations: threads of the linear algebra would only fight for the cores. Read when numpy is imported.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    import logging
+    import signal
+
+    from ema.bus import interface
+
+    from .settings import load
+
+    logging.basicConfig(level=logging.INFO, format="%(levelname)s %(message)s")
+    settings = load(config_path)
+    if bus is not None:
+        settings = settings.model_copy(update={"bus": interface.parse(bus)})
+    if log_path is not None:
+        log = settings.log.model_copy(update={"directory": str(Path(log_path).resolve())})
+        settings = settings.model_copy(update={"log": log})
+
+    from .assembly import assembled
+
+    with assembled(settings) as service:
+        stop: Any = lambda *_: service.stop()  # noqa: E731 - a handler takes a signal and a frame
+        signal.signal(signal.SIGTERM, stop)
+        signal.signal(signal.SIGINT, stop)
+        service.run()

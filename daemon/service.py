@@ -1,0 +1,136 @@
+"""The loop: bus → monitor → bus and log, with a heartbeat. Everything that decides is in the monitor."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from ema.bus.codec import Codec
+from ema.bus.port import MAX_BATCH, Port
+from ema.core.frames import overflow_notice
+from ema.core.status import ServiceState
+from ema.log import LogWriter
+from ema.monitor import FIRST, Event, Identified, Job, Level, Monitor, Output, SampledEnvelope
+
+from .health import Health
+from .notify import notify
+from .sinks import BusSink, LogSink
+from .worker import Worker
+
+BEAT = 1.0  # [s]
+_WAIT = 0.05  # longest wait for frames, so that answers of workers and signals are seen [s]
+_PATIENCE = 2.0  # for the workers at the end [s]
+
+
+class Service:
+    """Drives a monitor with a bus until `stop` is called.
+
+    Parameters
+    ----------
+    monitor : Monitor
+    port : Port
+    log : LogWriter
+    codec : Codec
+    workers : mapping of identifier to Worker
+    pace : float
+        After a read that left nothing waiting, frames are collected for so long: fewer, larger batches cost less. [s]
+    """
+
+    def __init__(
+        self, monitor: Monitor, port: Port, log: LogWriter, codec: Codec, workers: Mapping[str, Worker], pace: float
+    ):
+        self._monitor, self._port, self._log = monitor, port, log
+        self._bus_sink, self._log_sink = BusSink(port, codec), LogSink(log)
+        self._workers, self._pace = workers, pace
+        self._health = Health(monitor, port, log)
+        self._drops = 0
+        self._stopping = False
+
+    def stop(self) -> None:
+        """End the loop at its next turn; may be called from a signal handler."""
+        self._stopping = True
+
+    def run(self) -> None:
+        """Run until stopped; then finish what is begun."""
+        started = next_beat = time.monotonic()
+        self._event(Level.INFO, "started", self._port.choice)
+        notify("READY=1")
+        while not self._stopping:
+            frames = self._port.read(min(_WAIT, max(0.0, next_beat - time.monotonic())))
+            if frames.size:
+                self._ingest(frames)
+            self._answer_jobs(self._workers.values())
+            now = time.monotonic()
+            if now >= next_beat:
+                self._beat(now - started)
+                next_beat = max(next_beat + BEAT, now)
+            if 0 < frames.size < MAX_BATCH // 2:
+                time.sleep(self._pace)
+        notify("STOPPING=1")
+        self._finish(time.monotonic() - started)
+
+    def _ingest(self, frames: np.ndarray) -> None:
+        if self._port.counters.kernel_drops != self._drops:
+            self._drops = self._port.counters.kernel_drops
+            frames = np.concatenate([overflow_notice(int(frames["t_ns"][0])), frames])
+        self._log.frames(frames, self._port.name)
+        self._put(self._monitor.update(frames))
+
+    def _put(self, outputs: Iterable[Output]) -> None:
+        for out in outputs:
+            if isinstance(out, Identified):
+                self._bus_sink.estimate(out)
+                if out.estimate.method == FIRST:
+                    self._health.latency_ns = max(self._health.latency_ns, time.time_ns() - out.t_ns)
+                self._log_sink.estimate(out)
+            elif isinstance(out, SampledEnvelope):
+                self._log_sink.envelope(out)
+            elif isinstance(out, Event):
+                self._log_sink.event(out)
+            else:
+                self._submit(out)
+
+    def _submit(self, job: Job) -> None:
+        if not self._workers[job.method].submit(job):
+            self._health.n_skipped += 1
+            text = f"{job.method}: cycle {job.cycle} is skipped, the worker is behind"
+            self._log_sink.event(Event(job.t_ns, Level.WARNING, "job_skipped", text, job.actuator))
+
+    def _answer_jobs(self, workers: Iterable[Worker]) -> None:
+        for worker in workers:
+            if not worker.idle:
+                self._conclude(worker.answers())
+
+    def _conclude(self, answers: Iterable[tuple]) -> None:
+        for job, answer in answers:
+            if isinstance(answer, Exception):
+                self._health.n_failed += 1
+                text = f"{job.method}: cycle {job.cycle} failed: {' '.join(str(answer).split()) or repr(answer)}"
+                self._log_sink.event(Event(job.t_ns, Level.ERROR, "job_failed", text, job.actuator))
+            else:
+                self._put(self._monitor.conclude(job, answer))
+
+    def _beat(self, uptime: float) -> None:
+        now_ns = time.time_ns()
+        for event in self._health.look(now_ns):
+            self._log_sink.event(event)
+        self._send_beat(uptime, now_ns)
+        notify("WATCHDOG=1")
+
+    def _send_beat(self, uptime: float, now_ns: int) -> None:
+        self._bus_sink.heartbeat(self._health.heartbeat(uptime), now_ns)
+        self._log_sink.status(self._health.state, uptime, self._health.counters, now_ns)
+
+    def _finish(self, uptime: float) -> None:
+        self._put(self._monitor.finish())
+        for worker in self._workers.values():
+            self._conclude(worker.close(_PATIENCE))
+        self._health.look(time.time_ns())
+        self._health.state = ServiceState.STOPPING
+        self._send_beat(uptime, time.time_ns())
+        self._event(Level.INFO, "stopped", f"stopped after {uptime:.1f} s, {self._monitor.n_cycles} cycles")
+
+    def _event(self, level: Level, code: str, text: str) -> None:
+        self._log_sink.event(Event(time.time_ns(), level, code, text))

@@ -1,0 +1,73 @@
+"""The daemon's configuration (config/daemon.yaml)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from ema.bundle import Bundle
+from ema.bundle import load as load_bundle
+from ema.bus.interface import BusSettings
+from ema.core import config
+from ema.core.config import Settings
+from ema.core.errors import BundleError
+from ema.core.units import quantity
+from ema.log import LogSettings
+from ema.models.actuator import Actuator
+from ema.monitor import MonitorSettings
+
+Number = Annotated[int, Field(ge=0, le=63)]
+
+
+class ActuatorSettings(Settings):
+    """One monitored actuator. Paths are relative to the configuration's folder."""
+
+    bundle: str = Field(min_length=1, description="folder written by `ema build`")
+    plant: str | None = Field(default=None, description="the actuator's own file; a bundle made for another is refused")
+
+
+class LogSection(LogSettings):
+    """Where and how is logged."""
+
+    directory: str = Field(min_length=1, description="must exist; relative to the configuration's folder")
+
+
+class DaemonSettings(Settings):
+    """The whole configuration."""
+
+    bus: BusSettings = BusSettings()
+    actuators: dict[Number, ActuatorSettings] = Field(min_length=1, description="by number on the bus")
+    log: LogSection
+    monitor: MonitorSettings = MonitorSettings()
+    pace: float = quantity("s", "frames are collected for so long before they are looked at", 3e-3, ge=0, le=0.1)
+    queue: int = Field(default=8, ge=1, le=1000, description="cycles that may wait for a slower identifier")
+
+
+def load(path: Path) -> DaemonSettings:
+    """Read the configuration; its paths made absolute."""
+    settings = config.load(path, DaemonSettings)
+    folder = path.resolve().parent
+    actuators = {
+        number: one.model_copy(
+            update={"bundle": str(folder / one.bundle), "plant": one.plant and str(folder / one.plant)}
+        )
+        for number, one in settings.actuators.items()
+    }
+    log = settings.log.model_copy(update={"directory": str(folder / settings.log.directory)})
+    return settings.model_copy(update={"actuators": actuators, "log": log})
+
+
+def load_bundles(settings: DaemonSettings) -> dict[int, Bundle]:
+    """The bundle of each actuator; BundleError where it was made for another one."""
+    loaded: dict[str, Bundle] = {}
+    bundles = {}
+    for number, one in settings.actuators.items():
+        bundle = loaded.setdefault(one.bundle, None) or load_bundle(one.bundle)  # type: ignore[arg-type]
+        loaded[one.bundle] = bundles[number] = bundle
+        if one.plant is not None and config.digest(config.load(one.plant, Actuator)) != config.digest(bundle.plant):
+            raise BundleError(
+                f"{one.bundle}: was made for actuator '{bundle.plant.name}' with other parameters than {one.plant}"
+            )
+    return bundles
