@@ -107,6 +107,10 @@ class Codec:
         """Message of an identifier, of any actuator; None when it is foreign."""
         return self._by_id.get(identifiers.message_id(frame_id))
 
+    def filters(self, sender: str) -> list[tuple[int, int]]:
+        """Filters for `open_bus` that let through what this node of the DBC sends, for any actuator."""
+        return [(m.frame_id, identifiers.MESSAGE_MASK) for m in self.messages.values() if m.sender == sender]
+
     def split(self, frames: np.ndarray) -> Iterator[tuple[Message, np.ndarray]]:
         """The messages in a batch, each with its frames in order; foreign frames are left out."""
         ids = identifiers.message_id(frames["id"])

@@ -13,7 +13,7 @@ from pydantic import Field
 from ema.core.config import Settings
 from ema.core.errors import BusError
 
-from .port import Port
+from .port import Filters, Port
 from .python_can import PythonCanPort
 from .socketcan import SocketCanPort
 
@@ -46,14 +46,18 @@ def parse(text: str) -> BusSettings:
     return BusSettings(interface="socketcan", channel=text)
 
 
-def open_bus(settings: BusSettings) -> Port:
-    """Open the bus; its `choice` says what was taken and why. BusError when it cannot be opened."""
+def open_bus(settings: BusSettings, filters: Filters | None = None) -> Port:
+    """Open the bus; its `choice` says what was taken and why. BusError when it cannot be opened.
+
+    With `filters` only extended identifiers that agree with one of them are received (see `Codec.filters`); on a real
+    CAN interface the kernel leaves out the rest before it costs anything.
+    """
     if settings.interface != AUTO:
-        return _open(settings)
+        return _open(settings, filters)
     refused = []
     for interface, channel in (("socketcan", VCAN), ("udp_multicast", GROUP), ("virtual", "ema")):
         try:
-            port = _open(settings.model_copy(update={"interface": interface, "channel": channel}))
+            port = _open(settings.model_copy(update={"interface": interface, "channel": channel}), filters)
         except BusError as error:
             refused.append(str(error))
             continue
@@ -62,12 +66,12 @@ def open_bus(settings: BusSettings) -> Port:
     raise BusError("; ".join(refused))
 
 
-def _open(settings: BusSettings) -> Port:
+def _open(settings: BusSettings, filters: Filters | None) -> Port:
     interface, channel = settings.interface, settings.channel or _default_channel(settings.interface)
     name = f"{interface}:{channel}"
     if interface == "socketcan":
         try:
-            return SocketCanPort(channel, **settings.options)
+            return SocketCanPort(channel, filters, **settings.options)
         except TypeError as error:
             raise BusError(f"bus {name} cannot be opened ({error})") from error
     options: dict[str, Any] = {"fd": True} if interface != "virtual" else {"protocol": can.CanProtocol.CAN_FD}
@@ -79,6 +83,8 @@ def _open(settings: BusSettings) -> Port:
         raise BusError(f"bus {name} cannot be opened ({_why(error)})") from error
     if interface == "udp_multicast":
         _keep_on_loopback(bus.fileno(), channel)
+    if filters is not None:
+        bus.set_filters([{"can_id": i, "can_mask": mask, "extended": True} for i, mask in filters])
     return PythonCanPort(bus, name)
 
 

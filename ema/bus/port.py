@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
@@ -10,6 +11,7 @@ from typing import Self
 import numpy as np
 
 MAX_BATCH = 512  # frames read at once
+Filters = Sequence[tuple[int, int]]  # (identifier, mask of the bits in which a frame has to agree with it)
 
 
 @dataclass(slots=True)

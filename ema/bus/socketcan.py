@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import select
 import socket
 import struct
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,11 +16,12 @@ from ema.core.errors import BusError
 from ema.core.frames import FrameFlag
 
 from . import mmsg
-from .port import Port
+from .port import Filters, Port
 
 RECEIVE_BUFFER = 8 << 20  # asked for; the kernel doubles it: 22 000 CAN FD frames, 3 s of six actuators [B]
 BYTES_PER_FRAME = 766  # of the receive buffer, for a CAN FD frame (measured: the default of 212 992 B held 278)
 _CAN_RAW_ERR_FILTER = 2  # linux/can/raw.h; Python's socket module does not name it
+_SIOCGIFMTU = 0x8921  # linux/sockios.h
 _ALL_ERRORS = 0x1FFFFFFF
 _FULL_QUEUE_PATIENCE = 0.05  # [s]
 _FULL_QUEUE_PAUSE = 0.001  # [s]
@@ -47,9 +48,8 @@ class SocketCanPort(Port):
     ----------
     interface : str
         vcan0, can0 …
-    filters : sequence of (identifier, mask)
-        Extended identifiers to receive: those equal to `identifier` in the bits of `mask`. The kernel leaves out the
-        rest before it costs anything. Default: everything.
+    filters : Filters, optional
+        Extended identifiers to receive. The kernel leaves out the rest before it costs anything. Default: everything.
     receive_buffer : int
         Asked of the kernel; when it grants less, an event says so and what to do. [B]
 
@@ -59,9 +59,7 @@ class SocketCanPort(Port):
         No such interface, or no CAN in this kernel.
     """
 
-    def __init__(
-        self, interface: str, filters: Sequence[tuple[int, int]] | None = None, receive_buffer: int = RECEIVE_BUFFER
-    ):
+    def __init__(self, interface: str, filters: Filters | None = None, receive_buffer: int = RECEIVE_BUFFER):
         super().__init__(f"socketcan:{interface}")
         self._interface = interface
         self._in, self._out = mmsg.Batch(), mmsg.Batch()
@@ -144,6 +142,10 @@ class SocketCanPort(Port):
         self._socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, self._filters)
         self._socket.bind((self._interface,))
         self._index = socket.if_nametoindex(self._interface)
+        request = struct.pack("16si12x", self._interface.encode(), 0)  # struct ifreq
+        (mtu,) = struct.unpack_from("16xi", fcntl.ioctl(self._socket, _SIOCGIFMTU, request))
+        if mtu < mmsg.FD_SIZE:
+            self._events.append(f"{self.name}: MTU {mtu} is classic CAN: ip link set {self._interface} mtu 72")
 
     def _receive(self) -> np.ndarray:
         """Frames that wait; deals with the link's troubles."""
@@ -218,7 +220,7 @@ class SocketCanPort(Port):
         self._send_trouble = text
 
 
-def _packed(filters: Sequence[tuple[int, int]] | None) -> bytes:
+def _packed(filters: Filters | None) -> bytes:
     """Array of struct can_filter; extended data frames only, or everything."""
     if filters is None:
         return struct.pack("=II", 0, 0)

@@ -37,6 +37,19 @@ def test_frames_cross_a_bus_unchanged(word, currents):
         assert there.read(0.0).size == 0
 
 
+@pytest.mark.parametrize("word", ["virtual:test", "udp_multicast:239.74.163.99"])
+def test_filters_let_only_the_wanted_messages_through(word, currents, codec):
+    sent = currents(3)
+    sent["id"][1] = codec.messages["Heartbeat"].frame_id
+    with open_bus(parse(word)) as here, open_bus(parse(word), codec.filters("Actuator")) as there:
+        here.write(sent)
+        ids = there.read(1.0)["id"].tolist()
+        while len(ids) < 2:
+            ids += there.read(1.0)["id"].tolist()
+        assert ids == sent["id"][[0, 2]].tolist()
+        assert there.read(0.0).size == 0
+
+
 @pytest.mark.parametrize("word", ["nowhere:x", "socketcan:there-is-no-such-interface", "udp_multicast:10.0.0.1"])
 def test_a_bus_that_cannot_be_opened_is_one_line(word):
     with pytest.raises(BusError, match="cannot be opened"):

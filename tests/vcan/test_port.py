@@ -143,6 +143,17 @@ def test_classic_and_remote_frames_do_no_harm(port, raw_can):
     assert numbers(frames[frames["id"] == CAN_ID]) == [9]
 
 
+def test_interface_set_to_classic_can_is_said_with_the_remedy(vcan0, link):
+    link.set_mtu(16)
+    try:
+        with SocketCanPort(vcan0) as port:
+            assert any("mtu 72" in event for event in port.take_events())
+            assert port.write(some_frames(1)) == 0
+            assert any("cannot send" in event for event in port.take_events())
+    finally:
+        link.set_mtu(72)
+
+
 def test_receive_buffer_that_is_too_small_is_said_with_the_remedy(vcan0):
     with SocketCanPort(vcan0, receive_buffer=1 << 30) as port:
         (event,) = port.take_events()
