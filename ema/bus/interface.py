@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import socket
-import struct
+from collections.abc import Callable
 from typing import Any
 
 import can
@@ -13,13 +11,14 @@ from pydantic import Field
 from ema.core.config import Settings
 from ema.core.errors import BusError
 
+from .multicast import GROUP, MulticastPort
 from .port import Filters, Port
 from .python_can import PythonCanPort
 from .socketcan import SocketCanPort
 
 AUTO = "auto"
-GROUP = "239.74.163.2"  # python-can's own multicast group
 VCAN = "vcan0"
+OWN: dict[str, Callable[..., Port]] = {"socketcan": SocketCanPort, "udp_multicast": MulticastPort}
 
 
 class BusSettings(Settings):
@@ -69,20 +68,16 @@ def open_bus(settings: BusSettings, filters: Filters | None = None) -> Port:
 def _open(settings: BusSettings, filters: Filters | None) -> Port:
     interface, channel = settings.interface, settings.channel or _default_channel(settings.interface)
     name = f"{interface}:{channel}"
-    if interface == "socketcan":
+    if interface in OWN:
         try:
-            return SocketCanPort(channel, filters, **settings.options)
+            return OWN[interface](channel, filters, **settings.options)
         except TypeError as error:
             raise BusError(f"bus {name} cannot be opened ({error})") from error
     options: dict[str, Any] = {"fd": True} if interface != "virtual" else {"protocol": can.CanProtocol.CAN_FD}
-    if interface == "udp_multicast":
-        options["hop_limit"] = 0  # never leaves this machine
     try:
         bus = can.Bus(interface=interface, channel=channel, **{**options, **settings.options})
     except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
         raise BusError(f"bus {name} cannot be opened ({_why(error)})") from error
-    if interface == "udp_multicast":
-        _keep_on_loopback(bus.fileno(), channel)
     if filters is not None:
         bus.set_filters([{"can_id": i, "can_mask": mask, "extended": True} for i, mask in filters])
     return PythonCanPort(bus, name)
@@ -95,13 +90,3 @@ def _default_channel(interface: str) -> str:
 def _why(error: BaseException) -> str:
     root = error.__cause__ if isinstance(error.__cause__, OSError) else error
     return (root.strerror or str(root)) if isinstance(root, OSError) else str(root)
-
-
-def _keep_on_loopback(fileno: int, group: str) -> None:
-    """Send and join on the loopback interface; python-can takes the default route's."""
-    loopback = socket.inet_aton("127.0.0.1")
-    with socket.socket(fileno=os.dup(fileno)) as sock:
-        sock.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, loopback)
-        sock.setsockopt(
-            socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, struct.pack("4s4s", socket.inet_aton(group), loopback)
-        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +11,12 @@ from typing import Self
 
 import numpy as np
 
+from ema.core.frames import FrameFlag
+
 MAX_BATCH = 512  # frames read at once
+RECEIVE_BUFFER = 8 << 20  # asked for; the kernel doubles it: 22 000 CAN FD frames, 3 s of six actuators [B]
+BYTES_PER_FRAME = 766  # of the receive buffer, for a CAN FD frame (measured: the default of 212 992 B held 278)
+_SO_RCVBUFFORCE = 33  # asm-generic/socket.h; Python's socket module does not name it
 Filters = Sequence[tuple[int, int]]  # (identifier, mask of the bits in which a frame has to agree with it)
 
 
@@ -73,3 +79,27 @@ class Port(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def ask_for_buffer(sock: socket.socket, size: int) -> str | None:
+    """Ask the kernel for a receive buffer of `size` bytes; what to do when it grants less, else None."""
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, size)  # beyond rmem_max; needs CAP_NET_ADMIN
+    except PermissionError:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, size)
+    granted = sock.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+    if granted >= 2 * size:
+        return None
+    return (
+        f"receive buffer of {granted} B instead of {2 * size} B, about {granted // BYTES_PER_FRAME} frames: "
+        f"set net.core.rmem_max = {size} (90-ema-can.conf)"
+    )
+
+
+def passes(frames: np.ndarray, filters: Filters) -> np.ndarray:
+    """Whether the kernel would let each frame through, shape (n,): where there is no kernel to do it."""
+    agrees = np.zeros(frames.size, bool)
+    for frame_id, mask in filters:
+        agrees |= (frames["id"] ^ frame_id) & mask == 0
+    kind = frames["flags"] & (FrameFlag.EXTENDED | FrameFlag.REMOTE)
+    return agrees & (kind == FrameFlag.EXTENDED)

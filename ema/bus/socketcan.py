@@ -16,10 +16,8 @@ from ema.core.errors import BusError
 from ema.core.frames import FrameFlag
 
 from . import mmsg
-from .port import Filters, Port
+from .port import RECEIVE_BUFFER, Filters, Port, ask_for_buffer
 
-RECEIVE_BUFFER = 8 << 20  # asked for; the kernel doubles it: 22 000 CAN FD frames, 3 s of six actuators [B]
-BYTES_PER_FRAME = 766  # of the receive buffer, for a CAN FD frame (measured: the default of 212 992 B held 278)
 _CAN_RAW_ERR_FILTER = 2  # linux/can/raw.h; Python's socket module does not name it
 _SIOCGIFMTU = 0x8921  # linux/sockios.h
 _ALL_ERRORS = 0x1FFFFFFF
@@ -129,13 +127,8 @@ class SocketCanPort(Port):
         sock.setsockopt(socket.SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, _ALL_ERRORS)
         sock.setsockopt(socket.SOL_SOCKET, mmsg.SO_TIMESTAMPNS, 1)
         sock.setsockopt(socket.SOL_SOCKET, mmsg.SO_RXQ_OVFL, 1)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
-        granted = sock.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
-        if granted < 2 * receive_buffer:
-            self._events.append(
-                f"{self.name}: receive buffer of {granted} B instead of {2 * receive_buffer} B, about "
-                f"{granted // BYTES_PER_FRAME} frames: set net.core.rmem_max = {receive_buffer} (90-ema-can.conf)"
-            )
+        if warning := ask_for_buffer(sock, receive_buffer):
+            self._events.append(f"{self.name}: {warning}")
 
     def _bind(self) -> None:
         # Each time: a deleted interface takes the socket's filters with it, and then nothing is received at all.
