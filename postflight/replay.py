@@ -1,0 +1,119 @@
+"""`ema replay`: a log back onto a bus, or through the identifiers again."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ema.core.errors import LogError
+
+from .times import TimeOption, time_range
+
+
+@click.command()
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--onto", multiple=True, metavar="BUS",
+    help="Bus to send on: vcan0, udp_multicast, auto …; CHANNEL=BUS for one channel of the log (repeatable).",
+)  # fmt: skip
+@click.option(
+    "--speed", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True, help="inf: no waiting."
+)
+@click.option("--loop", type=click.IntRange(min=0), default=1, show_default=True, help="How often; 0: until stopped.")
+@click.option("--skip-gaps", type=click.FloatRange(min=0), metavar="S", help="Shorten longer silences to this. [s]")
+@click.option("--id", "ids", multiple=True, metavar="ID", help="Only these: ID, ID-ID or ID:MASK, hex; ~ inverts.")
+@click.option("--channel", multiple=True, metavar="NAME", help="Only this channel of the log (repeatable).")
+@click.option("--rename", multiple=True, metavar="ID=ID", help="Send an identifier as another, hex (repeatable).")
+@time_range
+@click.option("--json", "as_json", is_flag=True, help="Answer for a machine.")
+def replay(
+    logs: tuple[Path, ...], onto: tuple[str, ...], start: TimeOption, end: TimeOption, as_json: bool, **how: Any
+) -> None:
+    """Send the raw frames of a log on a bus, each at its own time.
+
+    LOG is an MCAP file, a directory of segments (read as one), or a candump, asc, blf, csv, trc or mf4 log.
+
+    \b
+    Examples:
+      ema replay flight.mcap --onto vcan0
+      ema replay /var/log/ema --onto vcan0 --speed 4 --skip-gaps 1 --start 60 --end 120
+      ema replay car.asc --onto 1=vcan0 --onto 2=vcan1 --id 100-1FF
+    """
+    from .open_log import open_log
+
+    if not onto:
+        raise click.UsageError("say where to: --onto BUS")
+    selection = _selection(how["ids"], how["channel"], how["rename"])
+    with open_log(logs, start, end) as log:
+        _send(log, selection, onto, how, as_json)
+
+
+def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any], as_json: bool) -> None:
+    import signal
+    import threading
+
+    from ema.bus.interface import open_bus, parse
+
+    from .onto import Replayer
+    from .pacing import Pace
+
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    with ExitStack() as opened:
+        ports = {}
+        for text in onto:
+            channel, _, bus = text.rpartition("=")
+            ports[channel] = opened.enter_context(open_bus(parse(bus)))
+            click.echo(ports[channel].choice, err=True)
+        longest = float("inf") if how["skip_gaps"] is None else how["skip_gaps"]
+        replayer = Replayer(ports, Pace(how["speed"], longest), stop)
+        rounds = 0
+        while not stop.is_set() and (how["loop"] == 0 or rounds < how["loop"]):
+            before = replayer.done.n_sent + replayer.done.n_refused
+            replayer.run(selection.apply(log.frames()))
+            rounds += 1
+            if replayer.done.n_sent + replayer.done.n_refused == before:
+                break
+    done = replayer.done
+    for damage in getattr(log, "damage", []):
+        click.echo(f"{damage}", err=True)
+    if done.n_sent + done.n_refused + done.n_unmapped == 0 and not stop.is_set():
+        raise LogError("no frame in the log is chosen")
+    answer = {
+        "sent": done.n_sent,
+        "refused": done.n_refused,
+        "unmapped": done.n_unmapped,
+        "rounds": rounds,
+        "duration": done.duration,
+        "latest": done.latest,
+        "late_share_1ms": done.late_share(0.001),
+    }
+    if as_json:
+        click.echo(json.dumps(answer, indent=2))
+        return
+    click.echo(
+        f"{done.n_sent} frames sent in {done.duration:.1f} s; {done.late_share(0.001):.2%} more than 1 ms late, "
+        f"the latest {done.latest * 1e3:.1f} ms"
+    )
+    if done.n_refused or done.n_unmapped:
+        click.echo(f"{done.n_refused} refused by the bus, {done.n_unmapped} of channels without a bus")
+
+
+def _selection(ids: tuple[str, ...], channels: tuple[str, ...], renames: tuple[str, ...]) -> Any:
+    from .selection import IdFilter, Selection
+
+    renamed = {}
+    for text in renames:
+        old, _, new = text.partition("=")
+        try:
+            renamed[int(old, 16)] = int(new, 16)
+        except ValueError as error:
+            raise click.BadParameter(f"{text!r} is not ID=ID in hexadecimal digits", param_hint="--rename") from error
+        if not 0 <= renamed[int(old, 16)] < 2**29:
+            raise click.BadParameter(f"{new!r} has more than 29 bits", param_hint="--rename")
+    return Selection(tuple(IdFilter.parse(text) for text in ids), channels, renamed)
