@@ -11,7 +11,7 @@ from ema.bus.codec import Codec
 from ema.bus.port import Port
 from ema.bus.protection import Sender
 from ema.core.status import ServiceState
-from ema.log import LogWriter
+from ema.log import LogWriter, contents
 from ema.monitor import Event, Identified, Level, SampledEnvelope
 
 logger = logging.getLogger("ema.daemon")
@@ -29,7 +29,7 @@ class BusSink:
     def estimate(self, out: Identified) -> None:
         """One frame for each estimate, at once."""
         e = out.estimate
-        residual = e.residual[np.isfinite(e.residual)]
+        residual = contents.rms(e.residual)
         values = {
             "cycle": out.cycle,
             "k": np.nan_to_num(e.k, nan=0.0)[None],
@@ -37,7 +37,7 @@ class BusSink:
             "status": int(e.status),
             "reason": int(e.reasons),
             "p_value": np.nan_to_num(e.p_value, nan=0.0),
-            "residual": np.sqrt(np.mean(residual**2)) if residual.size else _NO_LIMIT,
+            "residual": _NO_LIMIT if residual is None else residual,
         }
         self._send(f"Estimate{e.method.capitalize()}", out.actuator, values, out.t_ns)
 
@@ -57,58 +57,20 @@ class LogSink:
 
     def estimate(self, out: Identified) -> None:
         """One message for each estimate."""
-        e = out.estimate
-        self._log.estimate(
-            {
-                "t_ns": out.t_ns,
-                "actuator": out.actuator,
-                "method": e.method,
-                "cycle": out.cycle,
-                "status": e.status.name.lower(),
-                "reasons": e.reasons.names,
-                "k": e.k,
-                "sd": e.sd,
-                "p_value": e.p_value,
-            }
-        )
+        self._log.estimate(contents.estimate(out.t_ns, out.actuator, out.cycle, out.estimate))
 
     def envelope(self, out: SampledEnvelope) -> None:
         """Envelope at the schedule."""
-        self._log.envelope(
-            {
-                "t_ns": out.t_ns,
-                "actuator": out.actuator,
-                "cycle": out.cycle,
-                "t": out.t,
-                "measured": out.measured,
-                "model": out.model,
-                "sd": out.sd,
-            }
-        )
+        values = out.t, out.measured, out.model, out.sd
+        self._log.envelope(contents.envelope(out.t_ns, out.actuator, out.cycle, *values))
 
     def event(self, event: Event) -> None:
         """An event, here and as a line of the service's journal."""
         whose = "" if event.actuator is None else f"actuator {event.actuator}: "
         logger.log(_LEVELS[event.level], "%s%s", whose, event.text)
-        self._log.event(
-            {
-                "t_ns": event.t_ns,
-                "level": event.level.value,
-                "code": event.code,
-                "text": event.text,
-                "actuator": event.actuator,
-            }
-        )
+        self._log.event(contents.event(event.t_ns, event.level.value, event.code, event.text, event.actuator))
 
     def status(self, state: ServiceState, uptime: float, counters: dict[str, int], t_ns: int) -> None:
         """A copy of the heartbeat."""
-        self._log.status(
-            {
-                "t_ns": t_ns,
-                "state": state.name.lower(),
-                "uptime": uptime,
-                "log_state": self._log.state.name.lower(),
-                "log_free": self._log.free_bytes,
-                "counters": counters,
-            }
-        )
+        log = self._log
+        self._log.status(contents.status(t_ns, state, uptime, log.state, log.free_bytes, counters))

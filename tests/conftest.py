@@ -1,0 +1,83 @@
+"""What several folders' tests need: the shipped plant and codec, a small bundle, simulated traffic."""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the daemon: on thirty equations threads only spin
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from ema_offline_builder.build import build
+from ema_offline_builder.config import Builder
+from ema_simulator.disturb import disturb
+from ema_simulator.injection import FaultSource
+from ema_simulator.node import cycles
+from ema_simulator.scenario import Scenario
+from ema_simulator.traffic import Traffic
+
+from ema import bundle
+from ema.bus import codec
+from ema.core import config, resources
+from ema.models.actuator import Actuator
+
+EPOCH_NS = 1_700_000_000_000_000_000
+
+
+@pytest.fixture(scope="session")
+def shipped_plant() -> Actuator:
+    return config.load(resources.config("actuator.yaml"), Actuator)
+
+
+@pytest.fixture(scope="session")
+def coarse_bundle(shipped_plant, tmp_path_factory):
+    """A bundle built in a few seconds: coarser than the quick one, good enough to see a fault."""
+    builder = Builder.model_validate(
+        {
+            "plant": "actuator.yaml",
+            "seed": 11,
+            "campaign": {"n_snapshots": 120, "k_max": 0.3},
+            "n_seeds": 12,
+            "n_noise": 120,
+            "n_start": 80,
+            "jacobian": {"steps": [0.03, 0.06]},
+            "library": {
+                "k1_levels": [0.1, 0.3, 0.6],
+                "k2_levels": [0.05, 0.15, 0.4, 0.8],
+                "phase_levels": [0.05, 0.15, 0.3],
+                "k6_levels": [0.1, 0.3, 0.6],
+                "degree_f2": 2,
+            },
+        }
+    )
+    out = tmp_path_factory.mktemp("coarse") / "bundle"
+    with ThreadPoolExecutor(2) as pool:
+        build(builder, shipped_plant, out, pool)
+    return bundle.load(out)
+
+
+@pytest.fixture(scope="session")
+def fly(shipped_plant):
+    """Simulates a scenario: per cycle its true data and its frames, stamped as if received at the scenario's time."""
+    made: dict[str, list] = {}
+
+    def run(**scenario):
+        key = repr(scenario)
+        if key not in made:
+            made[key] = list(_flight(Scenario.model_validate(scenario), shipped_plant))
+        return [(cycle, frames.copy()) for cycle, frames in made[key]]
+
+    return run
+
+
+def _flight(scenario, plant):
+    shared = codec.default()
+    traffic = Traffic(shared, [a.number for a in scenario.actuators])
+    rng = np.random.default_rng(scenario.seed)
+    for cycle in cycles(scenario, plant, FaultSource(scenario, shared)):
+        frames, due = traffic.frames(cycle, scenario.period)
+        frames, due = disturb(frames, due, cycle.number, scenario.disturbances, rng)
+        frames["t_ns"] = EPOCH_NS + np.round(1e9 * (cycle.t_start + due)).astype(np.int64)
+        yield cycle, frames
