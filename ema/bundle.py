@@ -17,18 +17,21 @@ import numpy as np
 from ema.core.config import digest, validate
 from ema.core.errors import BundleError
 from ema.core.names import FAULTS
+from ema.identification.known_error import N_TERMS, KnownError
 from ema.identification.noise import NoiseModel
 from ema.models.actuator import Actuator
 from ema.models.lf2 import Lf2
 
 FORMAT = "ema-bundle"
-VERSION = 1
+VERSION = 2
 _LF2 = tuple(field.name for field in fields(Lf2) if field.name != "i0")
 SHAPES = {
     "i0": ("n_t",), "v1": ("n_t",), "eigenvalue_share": ("r",), "schedule": ("n_omega",), "A": ("n_omega", 6),
     "A_full": ("n_t", 6), "A_step": (6,), "Q": ("n_omega", 6), "R": (6, 6),
     "noise_switching": ("n_omega", "n_omega"), "noise_start": ("n_omega", "n_omega"), "start_B": ("n_omega", 2),
-    "start_scale": (2,), "model_error_linear": ("n_omega", "n_omega"), "model_error_lf2": ("n_omega", "n_omega"),
+    "start_scale": (2,), "noise_sizes": ("n_levels",), "noise_linear": ("n_levels", "n_omega", "n_omega"),
+    "noise_lf2": ("n_levels", "n_omega", "n_omega"), "error_linear": (N_TERMS, "n_omega"),
+    "error_lf2": (N_TERMS, "n_omega"),
     "noise_rms": ("n_t",),
     "i_SF": ("n_t",), "i_PH": (3, "n_t"), "f1": ("n_f1",), "f2": ("n_f2",),
     "k2_levels": ("n_k2",), "i_BLK": ("n_k2", "n_t"),
@@ -78,12 +81,22 @@ class Bundle:
         """The LF2 library over the whole cycle."""
         return Lf2(i0=self.i0, **{name: self.arrays[name] for name in _LF2})
 
-    def noise(self, method: str) -> NoiseModel:
-        """Noise model at the schedule for the identifier `method`."""
+    def known_error(self, method: str) -> KnownError:
+        """HF less the model of the identifier `method`, at the schedule."""
+        return KnownError(self.arrays[f"error_{method}"])
+
+    def noise(self, method: str, known: KnownError | None = None) -> NoiseModel:
+        """Noise model at the schedule for the identifier `method`; HF has no error of its own."""
         a = self.arrays
-        name = f"model_error_{method}"
-        error = a[name] if name in a else np.zeros_like(a["noise_switching"])
-        return NoiseModel(a["noise_switching"], a["noise_start"], a["start_B"], a["start_scale"], error)
+        return NoiseModel(
+            switching=a["noise_switching"],
+            sizes=a["noise_sizes"],
+            model_error=a.get(f"noise_{method}", np.zeros((len(a["noise_sizes"]), 1, 1))),
+            start=a["noise_start"],
+            B=a["start_B"],
+            start_scale=a["start_scale"],
+            known=known,
+        )
 
 
 def save(path: Path, plant: Actuator, builder: dict[str, Any], arrays: dict[str, np.ndarray], **facts: Any) -> Bundle:

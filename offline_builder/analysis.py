@@ -7,15 +7,17 @@ from collections.abc import Callable
 import numpy as np
 
 from ema.core.names import FAULTS
+from ema.identification.known_error import KnownError
 from ema.models.actuator import Actuator
 from ema.models.layout import STATE
 from ema.models.lf2 import Lf2
 from ema.reduction.pod import pod
 from ema.reduction.schedules import Knowledge, schedule
 
+from . import noise
 from .config import Builder
 from .library import fit_library
-from .runs import START_OFFSET, Plan
+from .runs import Plan
 
 THETA_U, THETA_M = STATE.index("theta_u"), STATE.index("theta_m")
 
@@ -38,51 +40,6 @@ def jacobian(
         columns.append(difference / step)
         steps.append(step)
     return np.column_stack(columns), np.array(steps)
-
-
-def covariance(x: np.ndarray) -> np.ndarray:
-    """Covariance of the columns of `x` (n, m), lightly shrunk towards its diagonal so that it can be inverted."""
-    n = len(x)
-    S = np.cov(x, rowvar=False)
-    shrink = min(0.5, x.shape[1] / (2.0 * n))
-    return (1.0 - shrink) * S + shrink * np.diag(np.diag(S))
-
-
-def start_influence(x: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Linear influence of the start state and the spread it leaves.
-
-    Parameters
-    ----------
-    x : array, shape (n, n_omega)
-        Deviation of the envelope from the nominal one at the schedule. [A]
-    s : array, shape (n, 2)
-        Start: user position, gear output θ_m/GR. [rad]
-
-    Returns
-    -------
-    B (n_omega, 2), covariance of the rest per unit distance² (n_omega, n_omega), scale of the start (2,)
-    """
-    B = np.linalg.lstsq(s, x, rcond=None)[0].T
-    scale = np.full(2, START_OFFSET)
-    distance2 = np.sum((s / scale) ** 2, axis=1)
-    rest = (x - s @ B.T) / np.sqrt(np.maximum(distance2, 0.05))[:, None]
-    return B, covariance(rest), scale
-
-
-def model_error(error: np.ndarray, k: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Covariance M of a model's error, E[e eᵀ] = Σ_switch + ‖k‖⁴ M, by weighted regression over a campaign.
-
-    Parameters
-    ----------
-    error : array, shape (n, n_omega)
-        HF less model. [A]
-    """
-    q = np.sum(k**2, axis=1)  # ‖k‖²
-    weight = 1.0 / (np.median(q) + q) ** 2  # small faults must count as much as large ones
-    S = np.einsum("n,ni,nj->ij", weight, error, error) - weight.sum() * noise
-    M = S / np.sum(weight * q**2)
-    lam, U = np.linalg.eigh(0.5 * (M + M.T))
-    return (U * np.maximum(lam, 1e-12 * lam.max())) @ U.T
 
 
 def analyse(
@@ -108,21 +65,35 @@ def analyse(
     lf2 = fit_library(envelopes, plan, builder, i0)
 
     say("noise")
-    switching = covariance(nominal[:, points] - i0[points])
+    known, levels = {}, {}
+    sets = noise.heldout(envelopes, plan, builder, points)
+    S = noise.switching(nominal[:, points], sets)
+    A = A_full[points]
+    trained = np.concatenate([np.arange(len(plan))[plan.groups[name]] for name in ("campaign", "scaled")])
+    k, x = plan.k[trained], envelopes[trained][:, points].astype(float)
+
+    def linear(k: np.ndarray) -> np.ndarray:
+        return i0[points] + k @ A.T
+
+    known["linear"] = KnownError.fitted(k, x - linear(k), noise.KNEE)
+    levels["linear"] = noise.model_error(linear, sets, S, known["linear"])
+    for name, model in {"lf2": lf2.at(points)}.items():
+        known[name] = error = KnownError.fitted(k, x - model(k), noise.KNEE)
+        levels[name] = noise.model_error(noise.corrected(model, error), sets, S, None)
+    sizes = [0.0, *(float(np.sqrt(np.mean(np.sum(k**2, axis=1)))) for k, _, _ in sets)]
+
     starts = plan.groups["start"]
     s = np.column_stack([plan.start[starts, THETA_U], plan.start[starts, THETA_M] / plant.transmission.GR])
-    B, start_rest, scale = start_influence(envelopes[starts][:, points].astype(float) - i0[points], s)
+    B, start_rest, scale = noise.start_influence(envelopes[starts][:, points].astype(float) - i0[points], s, S)
 
-    k = plan.k[plan.groups["campaign"]]
-    at = campaign[:, points].astype(float)
-    A = A_full[points]
     Q, R = np.linalg.qr(A)
     arrays = {
         "i0": i0, "noise_rms": noise_rms, "A_full": A_full, "A": A, "A_step": steps, "Q": Q, "R": R,
         "v1": modes.v[:, 0], "eigenvalue_share": modes.share, "schedule": points.astype(np.int64),
-        "noise_switching": switching, "noise_start": start_rest, "start_B": B, "start_scale": scale,
-        "model_error_linear": model_error(at - i0[points] - k @ A.T, k, switching),
-        "model_error_lf2": model_error(at - lf2.at(points)(k), k, switching),
+        "noise_switching": S, "noise_start": start_rest, "start_B": B, "start_scale": scale,
+        "noise_sizes": np.array(sizes),
+        **{f"noise_{name}": level for name, level in levels.items()},
+        **{f"error_{name}": error.coefficients for name, error in known.items()},
         **{name: getattr(lf2, name) for name in Lf2.__dataclass_fields__ if name != "i0"},
     }  # fmt: skip
     figures = {

@@ -17,6 +17,13 @@ class Campaign(Settings):
     k_max: float = quantity("", "largest fault drawn", gt=0, le=1)
 
 
+class Heldout(Settings):
+    """Faults that no model is fitted to, each run twice: how far models are from the truth, by size of the faults."""
+
+    n: int = Field(ge=20, le=100_000, description="fault vectors for each k_max")
+    k_max: list[float] = Field(min_length=1, max_length=20, description="largest fault drawn, ascending")
+
+
 class Jacobian(Settings):
     """Finite differences at k = 0."""
 
@@ -50,6 +57,7 @@ class Builder(Settings):
     plant: str = Field(description="file of the actuator, relative to this file")
     seed: int = Field(ge=0, description="everything random derives from it")
     campaign: Campaign
+    heldout: Heldout
     n_seeds: int = Field(ge=2, le=10_000, description="runs averaged for each step and level")
     n_noise: int = Field(ge=40, le=100_000, description="nominal runs for the switching-noise covariance")
     n_start: int = Field(ge=40, le=100_000, description="runs from random start states")

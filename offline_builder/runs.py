@@ -36,6 +36,10 @@ def plan(builder: Builder, plant: Actuator) -> Plan:
         "nominal": np.zeros((builder.n_noise, N_FAULTS)),
         "campaign": latin_hypercube(builder.campaign.n_snapshots, builder.campaign.k_max, builder.seed),
     }
+    groups["scaled"] = scaled_hypercube(builder.campaign.n_snapshots, builder.campaign.k_max, builder.seed + 2)
+    for n, k_max in enumerate(builder.heldout.k_max):
+        k = latin_hypercube(builder.heldout.n, k_max, builder.seed + 100 + n)
+        groups[f"heldout {k_max:g}"] = np.vstack([k, k])
     for j, fault in enumerate(FAULTS):
         for step in builder.jacobian.steps:
             groups[f"step {fault} {step:g}"] = _along(j, step, builder.n_seeds)
@@ -58,6 +62,12 @@ def plan(builder: Builder, plant: Actuator) -> Plan:
 def latin_hypercube(n: int, k_max: float, seed: int) -> np.ndarray:
     """Fault vectors within 0…k_max, shape (n, 6)."""
     return qmc.LatinHypercube(N_FAULTS, rng=np.random.default_rng(seed)).random(n) * k_max
+
+
+def scaled_hypercube(n: int, k_max: float, seed: int) -> np.ndarray:
+    """Fault vectors of all sizes alike: within 0…κ, κ log-uniform from k_max/25 to k_max, shape (n, 6)."""
+    u = qmc.LatinHypercube(N_FAULTS + 1, rng=np.random.default_rng(seed)).random(n)
+    return np.asarray(u[:, :N_FAULTS] * k_max * 25.0 ** (u[:, N_FAULTS:] - 1.0))
 
 
 def random_starts(plant: Actuator, k: np.ndarray, seed: int) -> np.ndarray:

@@ -8,6 +8,8 @@ import numpy as np
 
 from ema.core.status import Reason, Status
 
+from .truncated import Marginals
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -18,13 +20,17 @@ class Estimate:
     method : str
         Name of the identifier.
     k, sd : arrays, shape (6,)
-        Estimate, each within 0…1, and its standard deviation.
+        Estimate, each within 0…1, and its standard deviation (root mean square error expected, bounds known).
     covariance : array, shape (6, 6)
         Covariance before the bounds.
     chi2, dof, p_value : float, int, float
         Weighted sum of squared residuals, its degrees of freedom, probability of a larger one if the model holds.
     residual : array, shape (n_omega,)
         Measured less modelled envelope at the schedule; NaN where the measurement is not valid. [A]
+    marginals : Marginals or None
+        Distribution of each fault within its bounds, if there is an estimate.
+    unseparable : tuple of array, shape (6,)
+        Directions of k that this cycle's data leave open (unit vectors).
     """
 
     method: str
@@ -37,3 +43,12 @@ class Estimate:
     residual: np.ndarray
     status: Status
     reasons: Reason
+    marginals: Marginals | None = None
+    unseparable: tuple[np.ndarray, ...] = ()
+
+    def interval(self, level: float) -> np.ndarray:
+        """Limits between which each fault lies with probability `level`, shape (6, 2); NaN without an estimate."""
+        if self.marginals is None:
+            return np.full((len(self.k), 2), np.nan)
+        tail = 0.5 * (1.0 - level)
+        return np.column_stack([self.marginals.quantile(tail), self.marginals.quantile(1.0 - tail)])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from . import linear
 from .gauss_newton import GaussNewton
 
@@ -12,6 +14,11 @@ if TYPE_CHECKING:
 
 
 def make(bundle: Bundle) -> GaussNewton:
-    """The LF2 identifier of a bundle."""
-    first = linear.make(bundle)
-    return GaussNewton("lf2", bundle.lf2().at(bundle.schedule), bundle.noise("lf2"), lambda m: first.estimate(m).k)
+    """The LF2 identifier of a bundle; what is known of the library's error is taken off."""
+    first, noise = linear.make(bundle), bundle.noise("lf2")
+    library, error = bundle.lf2().at(bundle.schedule), bundle.known_error("lf2")
+
+    def model(k: np.ndarray, start: np.ndarray | None) -> np.ndarray:
+        return library(k) + error(k) + noise.start_shift(start)
+
+    return GaussNewton("lf2", model, noise, lambda measurement: first.estimate(measurement).k)

@@ -44,10 +44,11 @@ class Linear:
         k = np.zeros(6)
         for _ in range(3):  # weights depend on the size of the faults, and the other way round
             white = Whitener(self.noise.covariance(measurement.start, k)[np.ix_(v, v)])
-            k, covariance = bounded_least_squares(white(A), white(delta), low, high)
-        return concluded(self.method, measurement, k, covariance, delta - A @ k, white)
+            solution = bounded_least_squares(white(A), white(delta), low, high)
+            k = solution.x
+        return concluded(self.method, measurement, self.noise, np.zeros(6), solution, delta - A @ k, white)
 
 
 def make(bundle: Bundle) -> Linear:
     """The linear identifier of a bundle."""
-    return Linear(bundle.i0[bundle.schedule], bundle.A, bundle.noise("linear"))
+    return Linear(bundle.i0[bundle.schedule], bundle.A, bundle.noise("linear", bundle.known_error("linear")))

@@ -1,10 +1,12 @@
-"""How much a measured envelope may differ from a model's: switching noise, start state, and the model's own error.
+"""How much a measured envelope may differ from a model's: by switching, by the model's own error, by the start state.
 
-    Σ = Σ_switch + d² Σ_start + ‖k̂‖⁴ M
+    Σ(k, start) = Σ_switch + q(k) M(‖k‖) + d² Σ_start
 
-Σ_switch: two runs of the same actuator differ by what decides its comparators. Σ_start: what is left of the start
-state's influence when its linear part is taken off; it grows with the distance d of the start from the middle of the
-gap at zero. M: error of the model in use, which grows with the square of the faults. The builder measures all three.
+Σ_switch: two runs of the same actuator differ by what decides its comparators. M: covariance of the model's error for
+faults of a size, measured by the builder on held-out faults at some sizes (it follows no simple power) and interpolated
+in ‖k‖². q: one; or, for a model whose known error is not taken off (`linear`), the mean square of that error at k, so
+that M only has to tell its directions. Σ_start: what is left of the start state's influence when its linear part is
+taken off; it grows with the distance d of the start from the middle of the gap at zero.
 """
 
 from __future__ import annotations
@@ -13,25 +15,65 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .known_error import KnownError
+
+D2_UNKNOWN = 4.0  # d² if nobody measured the start
+D2_MAX = 25.0
+
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Covariances at the schedule, each (n_omega, n_omega), and the start state's linear influence `B` (n_omega, 2).
+    """Covariances at the schedule and the start state's linear influence.
 
-    `start_scale` (2,) are the start offsets (user, gear output) for which d is 1. [rad]
+    Attributes
+    ----------
+    switching : array, shape (n_omega, n_omega)
+        Covariance of one run of an actuator. [A²]
+    sizes : array, shape (m,)
+        Sizes ‖k‖ at which the model's error was measured, ascending from 0. [1]
+    model_error : array, shape (m, n_omega, n_omega)
+        Covariance of the model's error at these sizes, over q. [A², or 1 with a known error]
+    start : array, shape (n_omega, n_omega)
+        Covariance for a start at d = 1. [A²]
+    B : array, shape (n_omega, 2)
+        Linear influence of the start state: user position, gear output. [A/rad]
+    start_scale : array, shape (2,)
+        Start offsets for which d is 1. [rad]
+    known : KnownError or None
+        Scales `model_error` if given.
     """
 
     switching: np.ndarray
+    sizes: np.ndarray
+    model_error: np.ndarray
     start: np.ndarray
     B: np.ndarray
     start_scale: np.ndarray
-    model_error: np.ndarray
+    known: KnownError | None = None
 
     def start_shift(self, start: np.ndarray | None) -> np.ndarray:
         """Linear influence of the start state on the envelope, shape (n_omega,). [A]"""
         return np.zeros(len(self.B)) if start is None else self.B @ start
 
     def covariance(self, start: np.ndarray | None, k: np.ndarray) -> np.ndarray:
-        """Σ for a cycle that began at `start` (unknown: twice the scale) with faults near `k`."""
-        d2 = 4.0 if start is None else float(np.sum((start / self.start_scale) ** 2))
-        return self.switching + min(d2, 25.0) * self.start + float(k @ k) ** 2 * self.model_error
+        """Σ for a cycle that began at `start` with faults near `k`."""
+        d2 = D2_UNKNOWN if start is None else min(float(np.sum((start / self.start_scale) ** 2)), D2_MAX)
+        q = 1.0 if self.known is None else mean_square(self.known(k))
+        return self.switching + q * self._at_size(k) + d2 * self.start
+
+    def _at_size(self, k: np.ndarray) -> np.ndarray:
+        s2, q = self.sizes**2, float(k @ k)
+        if q >= s2[-1]:
+            return self.model_error[-1] * (q / s2[-1] if s2[-1] > 0 else 1.0)
+        upper = int(np.searchsorted(s2, q, side="right"))
+        share = (q - s2[upper - 1]) / (s2[upper] - s2[upper - 1])
+        return (1.0 - share) * self.model_error[upper - 1] + share * self.model_error[upper]
+
+    def beyond(self, k: np.ndarray) -> bool:
+        """Whether the faults are clearly larger than any the model was measured for."""
+        return bool(np.sqrt(k @ k) > 1.25 * self.sizes[-1])
+
+
+def mean_square(error: np.ndarray) -> float:
+    """Mean square over the instants, never zero. [A²]"""
+    return float(np.mean(error**2)) + 1e-12

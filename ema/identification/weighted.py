@@ -22,9 +22,10 @@ class Whitener:
 
 
 class Solution(NamedTuple):
-    """Minimiser `x` (m,) of ‖b - A x‖² within bounds, and the covariance (AᵀA)⁻¹ (m, m)."""
+    """Minimiser `x` (m,) of ‖b - A x‖² within bounds, `free` (m,) without, and its covariance (AᵀA)⁻¹ (m, m)."""
 
     x: np.ndarray
+    free: np.ndarray
     covariance: np.ndarray
 
 
@@ -33,12 +34,12 @@ def bounded_least_squares(A: np.ndarray, b: np.ndarray, low: np.ndarray, high: n
     Q, R = qr(A, mode="economic", check_finite=False)
     c = Q.T @ b
     R_inverse = solve_triangular(R + np.diag(np.where(np.diag(R) == 0, 1e-12, 0.0)), np.eye(R.shape[1]))
-    x = R_inverse @ c
+    x = free = R_inverse @ c
     if (x < low).any() or (x > high).any():
         x = low + nnls(R, c - R @ low)[0]
         if (x > high).any():
             x = lsq_linear(R, c, bounds=(low, high), method="bvls").x
-    return Solution(np.clip(x, low, high), R_inverse @ R_inverse.T)
+    return Solution(np.clip(x, low, high), free, R_inverse @ R_inverse.T)
 
 
 def p_value(chi2: float, dof: int) -> float:

@@ -26,6 +26,7 @@ def tiny() -> Builder:
             "plant": "actuator.yaml",
             "seed": 7,
             "campaign": {"n_snapshots": 60, "k_max": 0.3},
+            "heldout": {"n": 40, "k_max": [0.05, 0.3]},
             "n_seeds": 8,
             "n_noise": 60,
             "n_start": 60,

@@ -1,0 +1,93 @@
+"""Measure how far the envelope strays: by switching, by each model's error, by the start state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ema.identification.known_error import KnownError
+from ema.identification.noise import mean_square
+
+from .config import Builder
+from .runs import START_OFFSET, Plan
+
+Model = Callable[[np.ndarray], np.ndarray]  # fault vectors (n, 6) → envelopes at the schedule (n, n_omega)
+Sets = list[tuple[np.ndarray, np.ndarray, np.ndarray]]  # see `heldout`
+KNEE = 0.15  # size ‖k‖ up to which the known error is to be followed to the noise
+
+
+def corrected(model: Model, error: KnownError) -> Model:
+    """The model with its known error taken off."""
+    return lambda k: model(k) + error(k)
+
+
+def unbiased(S: np.ndarray, n: int) -> np.ndarray:
+    """Covariance scaled so that its inverse is right on average (Hartlap et al., A&A 464 (2007) 399)."""
+    return S * (n / max(n - len(S) - 2, 0.2 * n))
+
+
+def shrunk(S: np.ndarray, n: int) -> np.ndarray:
+    """Lightly drawn towards its diagonal, so that it can be inverted."""
+    share = min(0.5, len(S) / (4.0 * n))
+    return (1.0 - share) * S + share * np.diag(np.diag(S))
+
+
+def heldout(envelopes: np.ndarray, plan: Plan, builder: Builder, points: np.ndarray) -> Sets:
+    """For each size of held-out faults: fault vectors (n, 6), first and second run at the schedule (n, n_omega)."""
+    sets: Sets = []
+    for k_max in builder.heldout.k_max:
+        group = plan.groups[f"heldout {k_max:g}"]
+        first, second = np.split(envelopes[group][:, points].astype(float), 2)
+        sets.append((plan.k[group][: len(first)], first, second))
+    return sets
+
+
+def switching(nominal: np.ndarray, sets: Sets) -> np.ndarray:
+    """Covariance of one run: of the nominal ones about their mean, and of pairs with equal faults about theirs."""
+    x = np.vstack([nominal - nominal.mean(axis=0), *[(a - b) / np.sqrt(2.0) for _, a, b in sets]])
+    return unbiased(shrunk(x.T @ x / (len(x) - 1), len(x)), len(x))
+
+
+def model_error(model: Model, sets: Sets, S: np.ndarray, known: KnownError | None) -> np.ndarray:
+    """M at each size, shape (1 + number of sets, n_omega, n_omega); the first, for no fault, is zero.
+
+    Both runs of a pair have the model's error in common and nothing else, so M = E[e₁ e₂ᵀ]. Of its principal
+    directions, measured against the switching covariance `S`, those are kept that stand above what chance puts there.
+    """
+    L = np.linalg.cholesky(S)
+    levels = [np.zeros_like(S)]
+    for k, first, second in sets:
+        q = np.ones(len(k)) if known is None else np.array([mean_square(known(x)) for x in k])
+        e1, e2 = (np.linalg.solve(L, (x - model(k)).T) for x in (first, second))
+        M = (e1 / q) @ e2.T / len(k)
+        lam, U = np.linalg.eigh(0.5 * (M + M.T))
+        chance = np.sqrt(len(S) / len(k)) * float(np.mean(1.0 / q))
+        kept = lam > chance
+        levels.append(L @ (U[:, kept] * lam[kept]) @ U[:, kept].T @ L.T)
+    return np.array(levels)
+
+
+def start_influence(x: np.ndarray, s: np.ndarray, S: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Linear influence of the start state and the spread it leaves.
+
+    Parameters
+    ----------
+    x : array, shape (n, n_omega)
+        Deviation of the envelope from the nominal one at the schedule. [A]
+    s : array, shape (n, 2)
+        Start: user position, gear output θ_m/GR. [rad]
+    S : array, shape (n_omega, n_omega)
+        Switching covariance. [A²]
+
+    Returns
+    -------
+    B (n_omega, 2), covariance of the rest per unit distance² (n_omega, n_omega), scale of the start (2,)
+    """
+    B = np.linalg.lstsq(s, x, rcond=None)[0].T
+    scale = np.full(2, START_OFFSET)
+    d2 = np.sum((s / scale) ** 2, axis=1)
+    rest = x - s @ B.T
+    excess = (rest.T @ (rest * d2[:, None]) - d2.sum() * S) / np.sum(d2**2)  # regression of rest restᵀ - S on d²
+    lam, U = np.linalg.eigh(0.5 * (excess + excess.T))
+    return B, (U * np.maximum(lam, 0.0)) @ U.T, scale
