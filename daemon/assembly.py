@@ -41,7 +41,7 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     log_settings = LogSettings(**settings.log.model_dump(exclude={"directory"}))
     with ExitStack() as stack:
         log = stack.enter_context(LogWriter(settings.log.directory, attachments, log_settings))
-        port = stack.enter_context(open_bus(settings.bus))
+        port = stack.enter_context(open_bus(settings.bus, codec.filters("Actuator")))
         workers = {method: Worker(runner.run, settings.queue, method) for method in settings.monitor.slower}
         yield Service(monitor, port, log, codec, workers, settings.pace)
 

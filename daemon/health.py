@@ -36,16 +36,22 @@ class Health:
     state: ServiceState = ServiceState.STARTING
     counters: dict[str, int] = field(default_factory=dict)
     _log_state: LogState = LogState.OK
+    _silent: set[tuple[str, int]] = field(default_factory=set)
 
     def look(self, now_ns: int) -> list[Event]:
         """Update counters and state; what has happened since the last look."""
-        late = self.monitor.time_outs(now_ns)
+        silent = set(self.monitor.time_outs(now_ns))
         before, self.counters = self.counters, self._count()
         grown = {name: self.counters[name] - before.get(name, 0) for name in _TROUBLE}
         events = [
-            Event(now_ns, Level.WARNING, "time_out", f"no {message} frames in time", actuator)
-            for message, actuator in late
+            Event(now_ns, Level.WARNING, "time_out", f"{message} frames do not come", actuator)
+            for message, actuator in sorted(silent - self._silent)
         ]
+        events += [
+            Event(now_ns, Level.INFO, "in_time", f"{message} frames come again", actuator)
+            for message, actuator in sorted(self._silent - silent)
+        ]
+        self._silent = silent
         events += [Event(now_ns, Level.WARNING, "link", line) for line in self.port.take_events()]
         if any(grown.values()):
             text = ", ".join(f"{n} {_TROUBLE[name]}" for name, n in grown.items() if n > 0)
@@ -56,7 +62,7 @@ class Health:
             level = Level.INFO if good else Level.ERROR
             events.append(Event(now_ns, level, "log", f"log: {self._log_state.name.lower()}"))
         missing = any(n > 0 for name, n in grown.items() if name not in _HARMLESS)
-        sound = self._log_state is LogState.OK and not late and not missing
+        sound = self._log_state is LogState.OK and not silent and not missing
         self.state = ServiceState.RUNNING if sound else ServiceState.DEGRADED
         self.latency_ns = 0
         return events

@@ -1,0 +1,153 @@
+"""The loop with a scripted bus: what is sent, what is logged, what happens when something fails."""
+
+from __future__ import annotations
+
+import threading
+
+import cantools
+import numpy as np
+import pytest
+from ema_daemon.service import Service
+from ema_daemon.worker import Worker
+
+from ema.bus import codec as codecs
+from ema.bus.protection import Receiver
+from ema.core import resources
+from ema.core.status import ServiceState
+from ema.log import LogReader, LogWriter
+from ema.monitor import Identified, Monitor, MonitorSettings, Runner, answers
+
+CODEC = codecs.default()
+SETTINGS = MonitorSettings.model_validate({"slower": {"lf2": {"every": "2 s"}}})
+
+
+class Ran:
+    def __init__(self, port, reader):
+        self.port = port
+        self.messages = list(reader.messages())
+        self.frames = np.concatenate([batch.frames for batch in reader.frames()])
+        self.unfinished = reader.unfinished
+
+    def logged(self, topic):
+        return [m.content for m in self.messages if m.topic == topic]
+
+
+@pytest.fixture
+def run(coarse_bundle, tmp_path, scripted):
+    """Runs the service on batches of frames until they end."""
+
+    def go(batches, run_job=None, queue=8):
+        bundles = {0: coarse_bundle}
+        monitor = Monitor(bundles, CODEC, SETTINGS)
+        worker = Worker(run_job or Runner(bundles).run, queue, "lf2")
+        port = scripted(batches, lambda: service.stop())
+        with LogWriter(tmp_path) as log:
+            service = Service(monitor, port, log, CODEC, {"lf2": worker}, pace=0.0)
+            service.run()
+        with LogReader(tmp_path) as reader:
+            return Ran(port, reader)
+
+    return go
+
+
+def batches(frames, n=100):
+    return [frames[i : i + n] for i in range(0, frames.size, n)]
+
+
+def test_what_is_sent_is_what_is_logged_and_decodes_with_cantools(run, frames):
+    ran = run(batches(frames))
+    witness = cantools.database.load_file(resources.dbc())
+    sent = np.concatenate(ran.port.written)
+    assert (Receiver(CODEC).check(sent) == 0).all()
+    for method in ("linear", "lf2"):
+        message = witness.get_message_by_name(f"Estimate{method.capitalize()}")
+        on_bus = [message.decode(f["data"][: f["length"]].tobytes()) for f in sent if f["id"] == message.frame_id]
+        logged = ran.logged(f"/estimate/0/{method}")
+        assert len(on_bus) == len(logged) == {"linear": 6, "lf2": 3}[method]
+        for bus, log in zip(on_bus, logged, strict=True):
+            assert bus["cycle"] == log["cycle"]
+            assert str(bus["status"]) == log["status"]
+            assert [bus[f"k{n}"] for n in range(1, 7)] == pytest.approx(log["k"], abs=1e-4)
+            assert [bus[f"sd_k{n}"] for n in range(1, 7)] == pytest.approx(log["sd"], abs=1e-4)
+            assert bus["p_value"] == pytest.approx(log["p_value"], abs=1e-4)
+
+
+def test_the_log_replayed_gives_the_same_estimates_bit_for_bit(run, frames, coarse_bundle):
+    ran = run(batches(frames))
+    bundles = {0: coarse_bundle}
+    outputs = answers(iter(batches(ran.frames, 333)), Monitor(bundles, CODEC, SETTINGS), Runner(bundles))
+    again = [out for out in outputs if isinstance(out, Identified)]
+    for method in ("linear", "lf2"):
+        logged = ran.logged(f"/estimate/0/{method}")
+        own = [o for o in again if o.estimate.method == method]
+        assert [o.estimate.k.tolist() for o in own] == [content["k"] for content in logged]
+        assert [o.estimate.sd.tolist() for o in own] == [content["sd"] for content in logged]
+        assert [o.t_ns for o in own] == [content["t_ns"] for content in logged]
+
+
+def test_everything_received_is_logged_and_the_log_is_finished(run, frames):
+    ran = run(batches(frames))
+    assert np.array_equal(ran.frames, frames)
+    assert not ran.unfinished
+    assert [c["cycle"] for c in ran.logged("/envelope/0")] == list(range(6))
+    codes = [c["code"] for c in ran.logged("/event")]
+    assert codes == ["started", "time_out", "stopped"]  # the recorded frames are long past
+
+
+def test_the_heartbeat_counts(run, frames):
+    dirty = np.delete(frames, [50, 51])
+    dirty["data"][200, 30] ^= 1
+    ran = run(batches(dirty))
+    last = ran.logged("/status")[-1]
+    assert last["state"] == "stopping"
+    assert last["counters"]["n_cycles"] == 6
+    assert last["counters"]["n_lost"] == 3
+    assert last["counters"]["n_crc_error"] == 1
+    beat = ran.port.sent("Heartbeat")
+    assert beat["state"][-1] == ServiceState.STOPPING
+    assert (beat["n_cycles"][-1], beat["n_lost"][-1], beat["n_crc_error"][-1]) == (6, 3, 1)
+
+
+def test_a_stop_in_the_middle_of_a_cycle_answers_what_there_is(run, frames):
+    ran = run(batches(frames[:300]))
+    (only,) = ran.logged("/estimate/0/linear")
+    assert only["status"] == "invalid"
+    assert {"lost_frames", "no_end"} <= set(only["reasons"])
+
+
+def test_a_cycle_without_data_is_sent_without_numbers(run, frames):
+    currents = np.flatnonzero(frames["id"] == CODEC.messages["PhaseCurrents"].frame_id)
+    ran = run(batches(np.delete(frames, currents[:501])))
+    sent = ran.port.sent("EstimateLinear")
+    assert sent["status"][0] == 3
+    assert (sent["sd_k"][0] > 0.9).all()
+    assert ran.logged("/estimate/0/linear")[0]["k"] == [None] * 6
+
+
+def test_jobs_beyond_the_queue_are_skipped_and_said(run, frames):
+    gate = threading.Event()
+
+    def stuck(job):
+        gate.wait(10)
+        raise RuntimeError("no answer")
+
+    def open_gate(port):
+        gate.set()
+
+    ran = run([*batches(frames), open_gate], stuck, queue=1)
+    codes = [c["code"] for c in ran.logged("/event")]
+    assert codes.count("job_skipped") == 1
+    assert codes.count("job_failed") == 2
+    assert len(ran.logged("/estimate/0/linear")) == 6
+    assert ran.logged("/status")[-1]["counters"]["n_skipped"] == 1
+
+
+def test_what_the_kernel_drops_is_in_the_log_where_it_happened(run, frames):
+    def drop(port):
+        port.counters.kernel_drops += 100
+
+    ran = run([*batches(frames[:1500]), drop, *batches(frames[1600:])])
+    reasons = {c["cycle"]: c["reasons"] for c in ran.logged("/estimate/0/linear")}
+    assert [n for n, names in reasons.items() if "kernel_drops" in names] == [2]
+    assert ran.frames.size == frames.size - 100 + 1
+    assert ran.port.sent("Heartbeat")["kernel_drops"][-1] == 100
