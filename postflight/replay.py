@@ -13,46 +13,58 @@ from ema.core.errors import LogError
 
 from .times import TimeOption, time_range
 
+_PATH = click.Path(path_type=Path)
+
 
 @click.command()
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--onto", multiple=True, metavar="BUS",
-    help="Bus to send on: vcan0, udp_multicast, auto …; CHANNEL=BUS for one channel of the log (repeatable).",
+    help="Send on this bus: vcan0, udp_multicast, auto …; CHANNEL=BUS for one channel of the log (repeatable).",
 )  # fmt: skip
-@click.option(
-    "--speed", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True, help="inf: no waiting."
-)
-@click.option("--loop", type=click.IntRange(min=0), default=1, show_default=True, help="How often; 0: until stopped.")
-@click.option("--skip-gaps", type=click.FloatRange(min=0), metavar="S", help="Shorten longer silences to this. [s]")
-@click.option("--id", "ids", multiple=True, metavar="ID", help="Only these: ID, ID-ID or ID:MASK, hex; ~ inverts.")
+@click.option("--identify", is_flag=True, help="Estimate the faults again, and compare with the log's estimates.")
 @click.option("--channel", multiple=True, metavar="NAME", help="Only this channel of the log (repeatable).")
-@click.option("--rename", multiple=True, metavar="ID=ID", help="Send an identifier as another, hex (repeatable).")
 @time_range
+@click.option("--speed", type=click.FloatRange(0, min_open=True), default=1, help="With --onto. inf: no waiting.")
+@click.option("--loop", type=click.IntRange(min=0), default=1, help="With --onto. How often; 0: until stopped.")
+@click.option("--skip-gaps", type=click.FloatRange(min=0), metavar="S", help="With --onto. No silence is longer. [s]")
+@click.option("--id", "ids", multiple=True, metavar="ID", help="With --onto. ID, ID-ID or ID:MASK, hex; ~ inverts.")
+@click.option("--rename", multiple=True, metavar="ID=ID", help="With --onto. Send an identifier as another, hex.")
+@click.option("--bundle", multiple=True, metavar="[N=]DIR", help="With --identify. Not the log's own (for actuator N).")
+@click.option("--cycles", metavar="FILE", type=_PATH, help="With --identify. CSV of the comparison cycle by cycle.")
+@click.option("--out", metavar="FILE", type=_PATH, help="With --identify. New MCAP log of the new estimates.")
 @click.option("--json", "as_json", is_flag=True, help="Answer for a machine.")
 def replay(
-    logs: tuple[Path, ...], onto: tuple[str, ...], start: TimeOption, end: TimeOption, as_json: bool, **how: Any
+    logs: tuple[Path, ...], onto: tuple[str, ...], identify: bool, start: TimeOption, end: TimeOption, **how: Any
 ) -> None:
-    """Send the raw frames of a log on a bus, each at its own time.
+    """Send the raw frames of a log on a bus, each at its own time, or identify the faults from them again.
 
-    LOG is an MCAP file, a directory of segments (read as one), or a candump, asc, blf, csv, trc or mf4 log.
+    LOG is an MCAP file, a directory of segments (read as one), or a candump, asc, blf, csv, trc or mf4 log. With the
+    bundle that the log was made with, the estimates are the same to the last bit (else exit status 1); with another
+    bundle they are compared.
 
     \b
     Examples:
       ema replay flight.mcap --onto vcan0
       ema replay /var/log/ema --onto vcan0 --speed 4 --skip-gaps 1 --start 60 --end 120
       ema replay car.asc --onto 1=vcan0 --onto 2=vcan1 --id 100-1FF
+      ema replay /var/log/ema --identify
+      ema replay flight.mcap --identify --bundle new-bundle --cycles comparison.csv
     """
     from .open_log import open_log
 
-    if not onto:
-        raise click.UsageError("say where to: --onto BUS")
-    selection = _selection(how["ids"], how["channel"], how["rename"])
+    if bool(onto) == identify:
+        raise click.UsageError("say what for: --onto BUS or --identify")
     with open_log(logs, start, end) as log:
-        _send(log, selection, onto, how, as_json)
+        if identify:
+            from .reidentify import run
+
+            run(log, how["bundle"], how["channel"], how["cycles"], how["out"], how["as_json"])
+        else:
+            _send(log, _selection(how["ids"], how["channel"], how["rename"]), onto, how)
 
 
-def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any], as_json: bool) -> None:
+def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any]) -> None:
     import signal
     import threading
 
@@ -93,7 +105,7 @@ def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any], 
         "latest": done.latest,
         "late_share_1ms": done.late_share(0.001),
     }
-    if as_json:
+    if how["as_json"]:
         click.echo(json.dumps(answer, indent=2))
         return
     click.echo(

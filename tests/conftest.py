@@ -39,6 +39,7 @@ def coarse_bundle(shipped_plant, tmp_path_factory):
             "plant": "actuator.yaml",
             "seed": 11,
             "campaign": {"n_snapshots": 120, "k_max": 0.3},
+            "heldout": {"n": 40, "k_max": [0.05, 0.2]},
             "n_seeds": 12,
             "n_noise": 120,
             "n_start": 80,

@@ -78,7 +78,7 @@ def unpack(content: dict[str, Any]) -> np.ndarray:
     """Frames of a message, shape (count,); ValueError when they are not what the message says."""
     try:
         frames = raw.unpack(base64.b64decode(content["frames"], validate=True))
-    except (KeyError, TypeError, binascii.Error) as error:
+    except (KeyError, TypeError, AttributeError, binascii.Error) as error:
         raise ValueError("frames are not base64") from error
     if len(frames) != content.get("count") or (frames["length"] > raw.MAX_DATA).any():
         raise ValueError("frames do not match their count or length")

@@ -18,10 +18,6 @@ from .scan import Damage, McapFile
 Paths = str | Path | Iterable[str | Path]
 
 
-def _not_frames(topic: str) -> bool:
-    return topic != schemas.FRAMES.topic
-
-
 class Message(NamedTuple):
     """One message of a log."""
 
@@ -100,39 +96,37 @@ class LogReader:
         """Files that were not closed properly."""
         return [file.path for file in self._files if not file.finished]
 
-    def messages(
-        self, wanted: Callable[[str], bool] = lambda topic: topic != schemas.FRAMES.topic
-    ) -> Iterator[Message]:
-        """Messages on the wanted topics (default: all but the raw frames), in the order they were written."""
-        for file in self._files:
-            for raw in file.messages(wanted, self.start_ns, self.end_ns):
-                try:
-                    content = json.loads(raw.data)
-                except (ValueError, RecursionError):
-                    content = None
-                if isinstance(content, dict):
-                    yield Message(raw.topic, raw.t_ns, content)
-                else:
-                    self._note(Damage(file.path, 0, f"a message on {raw.topic} is not JSON"))
+    def messages(self, wanted: Callable[[str], bool] = lambda topic: True) -> Iterator[Message]:
+        """Messages on the wanted topics, without the raw frames, in the order they were written."""
+        for entry in self.entries(lambda topic: topic != schemas.FRAMES.topic and wanted(topic)):
+            if isinstance(entry, Message):
+                yield entry
 
     def frames(self) -> Iterator[FrameBatch]:
         """Raw frames in the order they were written."""
-        low, high = self.start_ns or 0, self.end_ns if self.end_ns is not None else 2**63 - 1
-        early = max(0, low - batches.MAX_SPAN_NS)  # a batch is stored at the time of its first frame
-        whole = self.start_ns is None and self.end_ns is None
+        for entry in self.entries(lambda topic: topic == schemas.FRAMES.topic):
+            if isinstance(entry, FrameBatch):
+                yield entry
+
+    def entries(self, wanted: Callable[[str], bool] = lambda topic: True) -> Iterator[Message | FrameBatch]:
+        """Messages and raw frames as they were written."""
+        low = 0 if self.start_ns is None else self.start_ns
+        high = 2**63 if self.end_ns is None else self.end_ns
+        # A batch is stored at the time of its first frame and holds others near it.
+        early, late = max(0, low - batches.MAX_SPAN_NS), high + batches.MAX_SPAN_NS
         for file in self._files:
-            for raw in file.messages(lambda topic: topic == schemas.FRAMES.topic, early, high + batches.MAX_SPAN_NS):
+            for raw in file.messages(wanted, early, late):
                 try:
                     content = json.loads(raw.data)
-                    frames = batches.unpack(content)
-                    bus = str(content.get("bus", ""))
-                except (ValueError, AttributeError, RecursionError):
-                    self._note(Damage(file.path, 0, "a batch of frames is damaged"))
-                    continue
-                if not whole:
-                    frames = frames[(frames["t_ns"] >= low) & (frames["t_ns"] < high)]
-                if len(frames):
-                    yield FrameBatch(bus, frames)
+                    if raw.topic == schemas.FRAMES.topic:
+                        frames = batches.unpack(content)
+                        chosen = frames[(frames["t_ns"] >= low) & (frames["t_ns"] < high)]
+                        if len(chosen):
+                            yield FrameBatch(str(content.get("bus", "")), chosen)
+                    elif low <= raw.t_ns < high:
+                        yield Message(raw.topic, raw.t_ns, dict(content))
+                except (ValueError, TypeError, RecursionError):
+                    self._note(Damage(file.path, 0, f"a message on {raw.topic} cannot be read"))
 
     def attachments(self) -> dict[str, bytes]:
         """Attached files by name; of one that several segments hold, the first segment's."""

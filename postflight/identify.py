@@ -1,0 +1,172 @@
+"""Recorded frames through the identifiers again: the monitor of the daemon, driven by a log."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import yaml
+
+from ema.bundle import Bundle
+from ema.bundle import load as load_bundle
+from ema.bus import codec as codecs
+from ema.bus import identifiers
+from ema.core import config
+from ema.core.errors import BundleError, LogError
+from ema.log import LogReader, Message, contents, schemas
+from ema.log.foreign import ForeignLog
+from ema.log.schemas import Encoded
+from ema.monitor import Event, Identified, Monitor, MonitorSettings, Output, Runner, SampledEnvelope, answers
+
+_LOOK_AT = 20_000  # frames of a log without configuration, to see whose they are
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What the frames are identified with.
+
+    Attributes
+    ----------
+    bundles : dict of actuator number to Bundle
+    settings : MonitorSettings
+        Those of the log, or the defaults.
+    same : bool
+        Whether every bundle is the one that the log was made with.
+    """
+
+    bundles: dict[int, Bundle]
+    settings: MonitorSettings
+    same: bool
+
+
+def setup(log: LogReader | ForeignLog, given: tuple[str, ...]) -> Setup:
+    """Bundles and settings by the log's attachments, and by what is `given`: PATH for all actuators, or NUMBER=PATH.
+
+    Raises
+    ------
+    LogError, BundleError
+        The log names no bundle, or the one it names is gone or has been built anew.
+    """
+    attached = log.attachments() if isinstance(log, LogReader) else {}
+    configuration = _configuration(attached)
+    named = {int(n): str(one["bundle"]) for n, one in configuration.get("actuators", {}).items()}
+    chosen = _given(given)
+    numbers = sorted(set(named) | {n for n in chosen if n is not None}) or _actuators_in(log)
+    paths = {n: chosen.get(n) or chosen.get(None) or named.get(n) for n in numbers}
+    if missing := [n for n, path in paths.items() if path is None]:
+        raise LogError(f"the log names no bundle for actuator {missing[0]}: name one with --bundle PATH")
+    loaded = {path: load_bundle(path) for path in sorted({str(path) for path in paths.values()})}
+    bundles = {n: loaded[str(path)] for n, path in paths.items()}
+    manifests = {n: attached.get(f"manifest-{n}.json", attached.get("manifest.json")) for n in numbers}
+    same = {n: _is_same(bundles[n], text) for n, text in manifests.items() if text is not None}
+    for n, is_same in same.items():
+        if not is_same and n not in chosen and None not in chosen:
+            raise BundleError(
+                f"{paths[n]}: is not the bundle that the log was made with, it has been built again; "
+                f"to compare the two, name it with --bundle"
+            )
+    settings = config.validate(configuration.get("monitor", {}), MonitorSettings, "daemon.yaml in the log: monitor")
+    return Setup(bundles, settings, len(same) == len(numbers) and all(same.values()))
+
+
+def identified(log: LogReader | ForeignLog, how: Setup, channels: tuple[str, ...] = ()) -> Iterator[Encoded | Message]:
+    """The monitor's answers to all frames as the daemon would log them, and between them the estimates it logged.
+
+    Memory does not grow with the log.
+
+    Yields
+    ------
+    Encoded
+        An answer.
+    Message
+        An estimate in the log.
+
+    Raises
+    ------
+    LogError
+        The frames are of several channels, and none was chosen.
+    """
+    logged: list[Message] = []
+    monitor = Monitor(how.bundles, codecs.default(), how.settings)
+    for answer in answers(_frames(log, channels, logged), monitor, Runner(how.bundles)):
+        yield from _taken(logged)
+        yield _encoded(answer)
+    yield from _taken(logged)
+
+
+def _encoded(answer: Output) -> Encoded:
+    if isinstance(answer, Identified):
+        content = contents.estimate(answer.t_ns, answer.actuator, answer.cycle, answer.estimate)
+        return schemas.ESTIMATE.encode(content)
+    if isinstance(answer, SampledEnvelope):
+        values = answer.t, answer.measured, answer.model, answer.sd
+        return schemas.ENVELOPE.encode(contents.envelope(answer.t_ns, answer.actuator, answer.cycle, *values))
+    assert isinstance(answer, Event), "jobs are done by `answers`"
+    event = contents.event(answer.t_ns, answer.level.value, answer.code, answer.text, answer.actuator)
+    return schemas.EVENT.encode(event)
+
+
+def _frames(log: LogReader | ForeignLog, channels: tuple[str, ...], logged: list[Message]) -> Iterator[np.ndarray]:
+    """Frames for the monitor; logged estimates met on the way are put into `logged`."""
+    wanted = (schemas.FRAMES.topic, "/estimate/")
+    entries = log.entries(lambda topic: topic.startswith(wanted)) if isinstance(log, LogReader) else log.frames()
+    only = ""
+    for entry in entries:
+        if isinstance(entry, Message):
+            logged.append(entry)
+        elif not channels or entry.bus in channels:
+            only = only or entry.bus
+            if entry.bus != only:
+                raise LogError(f"the log holds frames of channels '{only}' and '{entry.bus}': choose one by --channel")
+            yield entry.frames
+
+
+def _taken(logged: list[Message]) -> Iterator[Message]:
+    yield from logged
+    logged.clear()
+
+
+def _configuration(attached: dict[str, bytes]) -> dict[str, Any]:
+    """The daemon's configuration in the log, empty without one."""
+    try:
+        found = yaml.safe_load(attached.get("daemon.yaml", b""))
+    except (yaml.YAMLError, ValueError) as error:
+        raise LogError("daemon.yaml in the log is damaged") from error
+    return found if isinstance(found, dict) and isinstance(found.get("actuators"), dict) else {}
+
+
+def _given(given: tuple[str, ...]) -> dict[int | None, str]:
+    chosen: dict[int | None, str] = {}
+    for text in given:
+        number, equals, path = text.partition("=")
+        if equals and number.isdecimal():
+            chosen[int(number)] = path
+        else:
+            chosen[None] = text
+    return chosen
+
+
+def _actuators_in(log: LogReader | ForeignLog) -> list[int]:
+    """Whose currents the first frames of a log hold."""
+    currents = codecs.default().messages["PhaseCurrents"].frame_id
+    found: set[int] = set()
+    count = 0
+    for _, frames in log.frames():
+        own = frames["id"][identifiers.message_id(frames["id"]) == currents]
+        found |= set(identifiers.actuator(own).tolist())
+        count += len(frames)
+        if count > _LOOK_AT:
+            break
+    if not found:
+        raise LogError(f"none of the first {count} frames is a PhaseCurrents frame of this project's DBC")
+    return sorted(found)
+
+
+def _is_same(bundle: Bundle, text: bytes) -> bool:
+    try:
+        return bool(json.loads(text) == bundle.manifest)
+    except ValueError:
+        return False
