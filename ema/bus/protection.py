@@ -106,7 +106,7 @@ class Receiver:
                 stream.counts.n_good += 1
                 stream.last_ns = t_ns
             else:
-                check = checks[n] = stream.place(number)
+                check = checks[n] = stream.place(number, t_ns)
                 if check <= GOOD:
                     stream.last_ns = t_ns
         return np.frombuffer(checks, np.uint8)

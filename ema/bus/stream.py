@@ -9,6 +9,7 @@ from .e2e_state import Result, StateMachine
 from .header import N_SEQUENCES, ahead
 
 MAX_AHEAD = 64  # frames that may be lost in a row without the stream being taken for another one
+SILENCE_NS = 50_000_000  # a sender that has restarted was silent for longer
 MAX_MISSING = 256  # how many lost frames are remembered, to tell a late frame from a repeated one
 
 
@@ -51,8 +52,9 @@ class Stream:
     """Sequence tracking and E2E state of one identifier.
 
     A frame up to MAX_AHEAD ahead of the last one is taken as the next with losses between; one behind is late if
-    it was missing, else repeated. One farther off is refused, so that a stray frame cannot pull the sequence
-    away; if the frame after it continues from there, the sender has restarted and the stream follows it.
+    it was missing, else repeated. One farther off is refused, so that stray frames, old ones sent again by someone
+    for example, cannot pull the sequence away. When frames continue from there, the sender has restarted and the
+    stream follows: at once after a silence, else after as many frames as may be lost in a row.
     """
 
     data_id: int
@@ -63,7 +65,8 @@ class Stream:
     expected: int = -1  # next sequence number; -1 before the first frame
     steady: bool = False
     last_ns: int = 0
-    _stray: int = -1
+    _stray: int = -1  # sequence number of the last frame far off, -1: none since the last good one
+    _n_strays: int = 0  # in sequence
     _missing: dict[int, None] = field(default_factory=dict)  # lost sequence numbers, oldest first
 
     def refuse(self, check: Check) -> Check:
@@ -75,9 +78,9 @@ class Stream:
         self._update(Result.ERROR)
         return check
 
-    def place(self, sequence: int) -> Check:
-        """Judge a frame with correct CRC by its sequence number."""
-        check = self._judge(sequence)
+    def place(self, sequence: int, t_ns: int) -> Check:
+        """Judge a frame with correct CRC by its sequence number; the caller keeps `last_ns`."""
+        check = self._judge(sequence, t_ns)
         self._update(Result.OK if check <= GOOD else Result.OTHER)
         return check
 
@@ -91,7 +94,7 @@ class Stream:
         self.steady = False
         return True
 
-    def _judge(self, sequence: int) -> Check:
+    def _judge(self, sequence: int, t_ns: int) -> Check:
         counts = self.counts
         distance = 0 if self.expected < 0 else ahead(sequence, self.expected)
         if -MAX_AHEAD <= distance < 0:
@@ -104,7 +107,7 @@ class Stream:
             counts.n_repeated += 1
             return Check.REPEATED
         if not 0 <= distance <= MAX_AHEAD:
-            if not 0 < ahead(sequence, self._stray) <= MAX_AHEAD or self._stray < 0:
+            if not self._has_restarted(sequence, t_ns):
                 self._stray = sequence
                 counts.n_wrong_counter += 1
                 return Check.WRONG_COUNTER
@@ -115,10 +118,16 @@ class Stream:
         while len(self._missing) > MAX_MISSING:
             del self._missing[next(iter(self._missing))]
         self.expected = (sequence + 1) % N_SEQUENCES
-        self._stray = -1
+        self._stray, self._n_strays = -1, 0
         counts.n_lost += distance
         counts.n_good += 1
         return Check.SOME_LOST if distance else Check.OK
+
+    def _has_restarted(self, sequence: int, t_ns: int) -> bool:
+        """Whether frames far off the sequence are its continuation; counts those that follow one another."""
+        continues = self._stray >= 0 and 0 < ahead(sequence, self._stray) <= MAX_AHEAD
+        self._n_strays = self._n_strays + 1 if continues else 0
+        return continues and (t_ns - self.last_ns > SILENCE_NS or self._n_strays > MAX_AHEAD)
 
     def _update(self, result: Result) -> None:
         self.machine.update(result)
