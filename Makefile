@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test test-vcan wheel install uninstall check env bench lock clean
+.PHONY: demo test test-vcan test-systemd wheel install uninstall check env bench lock clean
 
 demo: env
 	$(BIN)/ema demo --out demo
@@ -16,6 +16,10 @@ test: env
 # On a real vcan0: this kernel's, else User-Mode Linux's (needs tools/install_system_packages).
 test-vcan: env
 	$(BIN)/python tools/on_vcan.py $(BIN)/pytest -m vcan tests/vcan
+
+# The service on a machine with a real systemd, in User-Mode Linux (needs tools/install_system_packages).
+test-systemd: env
+	$(BIN)/pytest -m systemd tests/systemd/test_machine.py
 
 check: env
 	$(BIN)/ruff check .

@@ -23,6 +23,7 @@ _SIOCGIFMTU = 0x8921  # linux/sockios.h
 _ALL_ERRORS = 0x1FFFFFFF
 _FULL_QUEUE_PATIENCE = 0.05  # [s]
 _FULL_QUEUE_PAUSE = 0.001  # [s]
+UP, DOWN, GONE = "link up again", "link down", "interface deleted"
 _GONE_PAUSE = 0.05  # between two looks for an interface that is not there [s]
 
 # linux/can/error.h
@@ -63,7 +64,7 @@ class SocketCanPort(Port):
         self._in, self._out = mmsg.Batch(), mmsg.Batch()
         self._filters = _packed(filters)
         self._index = 0  # of the interface the socket is bound to, 0: none
-        self._is_up = True
+        self._link_state = UP
         self._send_trouble = ""
         self._errors_said = 0
         try:
@@ -103,7 +104,7 @@ class SocketCanPort(Port):
             try:
                 n_sent += self._out.send(self._socket.fileno(), frames[n_sent:])
             except OSError as error:
-                if error.errno == errno.EINTR:
+                if error.errno == errno.EINTR or self._is_old_news(error):
                     continue
                 if error.errno in (errno.ENOBUFS, errno.EAGAIN) and time.monotonic() < end:
                     self.counters.n_send_retries += 1
@@ -114,6 +115,7 @@ class SocketCanPort(Port):
                 break
         else:
             self._say_send_trouble("")
+            self._set_link(UP)
         self.counters.n_sent += n_sent
         return n_sent
 
@@ -158,9 +160,7 @@ class SocketCanPort(Port):
         frames = self._without_errors(frames)
         if len(frames):
             self.counters.n_received += len(frames)
-            if not self._is_up:
-                self._is_up = True
-                self._events.append(f"{self.name}: link up again")
+            self._set_link(UP)
         return frames
 
     def _without_errors(self, frames: np.ndarray) -> np.ndarray:
@@ -175,22 +175,30 @@ class SocketCanPort(Port):
             self._events.append(f"{self.name}: error frames: {', '.join(names) or hex(classes)}")
         return frames[~is_error]
 
+    def _is_old_news(self, error: OSError) -> bool:
+        """Whether a failed sending only told, before anything was tried, what had happened to the link meanwhile."""
+        before = self._link_state
+        if error.errno in (errno.ENETDOWN, errno.ENODEV):
+            self._link_trouble(error)
+        return self._link_state != before
+
     def _link_trouble(self, error: OSError) -> None:
         if error.errno in (errno.EAGAIN, errno.EINTR):
             return
         if error.errno == errno.ENETDOWN:
-            self._went_down("link down")
+            self._set_link(DOWN)
         elif error.errno == errno.ENODEV:
             self._index = 0
-            self._went_down("interface deleted")
+            self._set_link(GONE)
         else:
             self.counters.n_unreadable += 1
             self._events.append(f"{self.name}: {error.strerror}")
 
-    def _went_down(self, why: str) -> None:
-        self.counters.n_link_down += self._is_up
-        self._is_up = False
-        self._events.append(f"{self.name}: {why}")
+    def _set_link(self, state: str) -> None:
+        if state != self._link_state:
+            self.counters.n_link_down += self._link_state == UP
+            self._link_state = state
+            self._events.append(f"{self.name}: {state}")
 
     def _is_bound(self) -> bool:
         """Whether the socket is bound to the interface of this name; binds it again when that is a new one.

@@ -54,7 +54,8 @@ class Stream:
     A frame up to MAX_AHEAD ahead of the last one is taken as the next with losses between; one behind is late if
     it was missing, else repeated. One farther off is refused, so that stray frames, old ones sent again by someone
     for example, cannot pull the sequence away. When frames continue from there, the sender has restarted and the
-    stream follows: at once after a silence, else after as many frames as may be lost in a row.
+    stream follows: at once after a silence, else after as many frames as may be lost in a row. Should the sequence
+    it has left go on after all, it returns.
     """
 
     data_id: int
@@ -67,6 +68,8 @@ class Stream:
     last_ns: int = 0
     _stray: int = -1  # sequence number of the last frame far off, -1: none since the last good one
     _n_strays: int = 0  # in sequence
+    _left: int = -1  # what was expected before the stream followed another sequence, -1: it has not
+    _followed: int = 0  # where that began
     _missing: dict[int, None] = field(default_factory=dict)  # lost sequence numbers, oldest first
 
     def refuse(self, check: Check) -> Check:
@@ -107,12 +110,17 @@ class Stream:
             counts.n_repeated += 1
             return Check.REPEATED
         if not 0 <= distance <= MAX_AHEAD:
-            if not self._has_restarted(sequence, t_ns):
+            if self._returns(sequence):
+                distance = ahead(sequence, self._left)
+                self._left = -1
+            elif self._has_restarted(sequence, t_ns):
+                self._left, self._followed = self.expected, sequence
+                distance = 0
+            else:
                 self._stray = sequence
                 counts.n_wrong_counter += 1
                 return Check.WRONG_COUNTER
             self._missing.clear()
-            distance = 0
         for lost in range(sequence - distance, sequence):
             self._missing[lost % N_SEQUENCES] = None
         while len(self._missing) > MAX_MISSING:
@@ -128,6 +136,11 @@ class Stream:
         continues = self._stray >= 0 and 0 < ahead(sequence, self._stray) <= MAX_AHEAD
         self._n_strays = self._n_strays + 1 if continues else 0
         return continues and (t_ns - self.last_ns > SILENCE_NS or self._n_strays > MAX_AHEAD)
+
+    def _returns(self, sequence: int) -> bool:
+        """Whether the sequence left a short while ago goes on."""
+        lately = ahead(self.expected, self._followed) <= MAX_MISSING
+        return self._left >= 0 and lately and 0 <= ahead(sequence, self._left) <= MAX_AHEAD
 
     def _update(self, result: Result) -> None:
         self.machine.update(result)

@@ -82,6 +82,15 @@ def test_old_frames_sent_again_do_not_pull_the_sequence_away(codec, sent):
     assert receiver.counts.n_lost == 0
 
 
+def test_old_frames_sent_again_in_a_pause_are_left_when_the_sequence_goes_on(codec, sent):
+    order = [*range(200), *range(40), *range(200, 400)]
+    frames = sent[order]
+    frames["t_ns"] = 1_000_000 * np.arange(len(frames)) + np.where(np.arange(len(frames)) >= 200, 2 * SILENCE_NS, 0)
+    checks, receiver = checks_of(codec, frames)
+    assert checks[240:] == [OK] * 200
+    assert receiver.counts.n_lost == 0
+
+
 def test_batch_boundaries_do_not_matter(codec, sent):
     rng = np.random.default_rng(5)
     order = np.sort(rng.choice(400, 350, replace=False))

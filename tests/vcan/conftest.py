@@ -4,10 +4,18 @@ import os
 import socket
 import struct
 import subprocess
+import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+import yaml
+
+from ema.bus import codec
+from ema.bus.socketcan import SocketCanPort
+from ema.core.status import Status
+from ema.log import LogReader
 
 HERE = Path(__file__).parent
 INTERFACE = "vcan0"
@@ -28,7 +36,7 @@ def pytest_terminal_summary(terminalreporter):
     terminalreporter.write_line(f"on a real vcan0: {counts}; kernel {os.uname().release}")
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture(autouse=True, scope="session")
 def vcan0(request):
     """The interface's name. Without the interface: skipped, but a failure where these tests were asked for by name."""
     if INTERFACE not in dict(socket.if_nameindex()).values():
@@ -72,8 +80,8 @@ class Link:
         self.set_mtu(72)
 
     def throttle(self):
-        """A transmit queue of a few frames that drains slowly: a full one answers ENOBUFS."""
-        _run(*f"tc qdisc add dev {self._interface} root tbf rate 8kbit burst 200 limit 400".split())
+        """A transmit queue of a few frames that hardly drains: a full one answers ENOBUFS."""
+        _run(*f"tc qdisc add dev {self._interface} root tbf rate 64bit burst 200 limit 400".split())
 
     def release(self):
         _run("tc", "qdisc", "delete", "dev", self._interface, "root")
@@ -153,3 +161,89 @@ def candump(vcan0):
 def _n_listeners():
     """Raw sockets that receive every frame, as the kernel lists them."""
     return Path("/proc/net/can/rcvlist_all").read_text().count(" raw")
+
+
+@pytest.fixture(scope="session")
+def daemon_on_vcan0(vcan0, coarse_bundle):
+    """Starts `ema daemon` processes on vcan0: `daemon_on_vcan0(folder)`; ended with the session at the latest."""
+    started = []
+
+    def start(folder, **log_settings):
+        started.append(DaemonProcess(vcan0, coarse_bundle.path, folder, log_settings))
+        return started[-1]
+
+    yield start
+    for daemon in started:
+        daemon.close()
+
+
+class DaemonProcess:
+    """An `ema daemon` of its own process, and what it broadcasts."""
+
+    def __init__(self, interface, bundle, folder, log_settings):
+        self.log_folder = folder / "log"
+        self.log_folder.mkdir(exist_ok=True)
+        settings = {
+            "bus": {"interface": "socketcan", "channel": interface},
+            "actuators": {0: {"bundle": str(bundle)}},
+            "log": {"directory": str(self.log_folder), "flush_interval": 0.2, **log_settings},
+        }
+        (folder / "daemon.yaml").write_text(yaml.safe_dump(settings))
+        self._codec = codec.default()
+        self._port = SocketCanPort(interface, self._codec.filters("Monitor"))
+        self._waiting = []
+        words = [Path(sys.executable).with_name("ema"), "daemon", "--config", folder / "daemon.yaml"]
+        self._said = folder / "stderr"
+        with self._said.open("w") as said:
+            self.process = subprocess.Popen(words, stderr=said)
+        self.next("Heartbeat")
+
+    def next(self, name, wanted=lambda values: True, patience=60):
+        """Values of the next message of this name that is wanted; those before it, of any name, are passed over."""
+        end = time.monotonic() + patience
+        while time.monotonic() < end and self.process.poll() is None:
+            for values in self._messages(name):
+                if wanted(values):
+                    return values
+        pytest.fail(f"no {name} that was wanted in {patience} s; the daemon: {self._said.read_text()}")
+
+    def estimate(self, cycle):
+        """(k as counts on the bus, status) of the linear estimate of a cycle."""
+        values = self.next("EstimateLinear", lambda values: values["cycle"] == cycle)
+        scale = self._codec.messages["EstimateLinear"].fields["k"].scale
+        return np.round(values["k"] / scale).astype(int).tolist(), Status(int(values["status"]))
+
+    def _messages(self, name):
+        for message, frames in self._codec.split(self._port.read(0.2)):
+            if message.name == name:
+                values = message.decode(frames)
+                for row in range(len(frames)):
+                    yield {key: value[row] for key, value in values.items()}
+
+    def events(self):
+        """Texts of the events logged so far."""
+        with LogReader(self.log_folder) as log:
+            return [m.content["text"] for m in log.messages(lambda topic: topic == "/event")]
+
+    def wait_for_event(self, part, patience=60):
+        """Wait until an event is in the log whose text has this part."""
+        end = time.monotonic() + patience
+        while not any(part in text for text in self.events()):
+            assert time.monotonic() < end, f"no event '{part}' among {self.events()}"
+            time.sleep(0.3)
+
+    def cpu_time(self):
+        """Processor time it has taken. [s]"""
+        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    def stop(self):
+        """Ask it to end; its exit status."""
+        self.process.terminate()
+        return self.process.wait(timeout=60)
+
+    def close(self):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        self._port.close()

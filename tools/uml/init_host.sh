@@ -12,6 +12,7 @@ for module in net/can/can net/can/can-raw net/can/can-bcm drivers/net/can/dev/ca
     busybox insmod $modules/$module.ko
 done
 . "${0%/*}/vcan_up.sh"
+busybox sysctl -q -p "${0%/*}/../../systemd/90-ema-can.conf"
 echo EMA-OUTPUT-BEGINS
 sh "$EMA_JOB/command.sh" </dev/null
 echo $? >"$EMA_JOB/status"
