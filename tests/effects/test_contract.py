@@ -35,7 +35,7 @@ def test_declaration(effect):
     effect.sentence.format(**effect.neutral())
     assert effect.separated_by
     for p in effect.parameters:
-        assert p.low <= p.neutral <= p.high or "compliance" in effect.name
+        assert p.low <= p.neutral <= p.high
         assert p.low <= p.start <= p.high
         if p.unit not in ("1", "1/turn"):
             convert(p.unit, p.unit)
