@@ -12,6 +12,7 @@ from ema.bus.codec import Codec
 from ema.bus.header import sequence
 from ema.bus.protection import Receiver
 from ema.bus.stream import GOOD, Check
+from ema.core import frames as fr
 from ema.core.frames import FrameFlag, is_overflow
 from ema.models.actuator import Actuator
 
@@ -22,6 +23,7 @@ from .settings import MonitorSettings
 
 _ERROR, _TX = int(FrameFlag.ERROR), int(FrameFlag.TX)
 RECEIVED = ("CycleStart", "CycleEnd", "PhaseCurrents", "Motion", "Supply")
+_MANY = 256  # frames that wait at most
 _CHIRP = 0  # motion_kind in the DBC
 
 
@@ -36,6 +38,14 @@ class _Batch(NamedTuple):
 
     def part(self, begin: int, end: int) -> _Batch:
         return _Batch(*(column[begin:end] for column in self))
+
+
+def _joined(batches: list[_Batch]) -> _Batch:
+    if len(batches) == 1:
+        return batches[0]
+    if not batches:
+        return _Batch(fr.empty(0), *(np.zeros(0, kind) for kind in (np.uint8, np.int64, np.uint32, np.uint32)))
+    return _Batch(*(np.concatenate(columns) for columns in zip(*batches, strict=True)))
 
 
 class Assembler:
@@ -53,6 +63,7 @@ class Assembler:
         self.receiver = Receiver(codec, RECEIVED, plants)
         self._codec = codec
         self._plants = plants
+        self._waiting: list[_Batch] = []
         ids = {name: codec.messages[name].frame_id for name in RECEIVED}
         self._start, self._end, self._currents, self._motion, _ = ids.values()
         timeout_ns, grace_ns = round(settings.timeout * 1e9), round(settings.grace * 1e9)
@@ -62,7 +73,9 @@ class Assembler:
 
     def feed(self, frames: np.ndarray) -> Iterator[AssembledCycle | Event]:
         """Take frames in the order they were received, shape (n,); cycles as they close, and what was odd."""
-        batch = self._checked(frames)
+        batch = self._gathered(self._checked(frames))
+        if batch is None:
+            return
         bounds = (batch.checks <= GOOD) & ((batch.message == self._start) | (batch.message == self._end))
         marks = bounds | is_overflow(batch.frames)
         begin = 0
@@ -75,6 +88,8 @@ class Assembler:
 
     def finish(self) -> Iterator[AssembledCycle | Event]:
         """Close what is open, because no more frames will come."""
+        yield from self._place(_joined(self._waiting))
+        self._waiting = []
         for assembly in self._assemblies.values():
             for cycle in assembly.finish():
                 yield from self._closed(assembly, cycle)
@@ -84,12 +99,31 @@ class Assembler:
         late = self.receiver.time_outs(now_ns)
         return [(self._codec.find(i).name, identifiers.actuator(i)) for i in late]  # type: ignore[union-attr]
 
+    def _gathered(self, batch: _Batch) -> _Batch | None:
+        """The frames that wait to be placed, once there is a reason to: placing a few costs as much as placing many.
+
+        What is placed later is placed the same: the frames' own times decide, not the batches.
+        """
+        self._waiting.append(batch)
+        if not batch.frames.size or not (
+            sum(part.frames.size for part in self._waiting) >= _MANY
+            or ((batch.message == self._start) | (batch.message == self._end)).any()
+            or is_overflow(batch.frames).any()
+            or any(assembly.may_be_due(int(batch.t_ns.max())) for assembly in self._assemblies.values())
+        ):
+            return None
+        gathered, self._waiting = _joined(self._waiting), []
+        return gathered
+
     def _checked(self, frames: np.ndarray) -> _Batch:
-        flags = frames["flags"]
-        frames = frames[((flags & _TX) == 0) & (((flags & _ERROR) == 0) | is_overflow(frames))]
-        data = (frames["flags"] & _ERROR) == 0
-        checks = np.full(frames.size, Check.FOREIGN, np.uint8)
-        checks[data] = self.receiver.check(frames[data])
+        odd = (frames["flags"] & (_TX | _ERROR)) != 0
+        if not odd.any():
+            checks = self.receiver.check(frames)
+        else:
+            frames = frames[((frames["flags"] & _TX) == 0) & (~odd | is_overflow(frames))]
+            data = (frames["flags"] & _ERROR) == 0
+            checks = np.full(frames.size, Check.FOREIGN, np.uint8)
+            checks[data] = self.receiver.check(frames[data])
         ids = frames["id"]
         t_ns = frames["t_ns"].astype(np.int64)
         return _Batch(frames, checks, t_ns, identifiers.message_id(ids), identifiers.actuator(ids))

@@ -77,6 +77,10 @@ class Assembly:
         """The kernel dropped frames, of whom is not known."""
         self._dropped = True
 
+    def may_be_due(self, t_ns: int) -> bool:
+        """Whether a frame of this time might close the open cycle; cheap, and mostly not."""
+        return self._span is not None and (self._end_ns < NEVER or t_ns > self._latest_ns + self._timeout_ns)
+
     def due(self, t_ns: np.ndarray, own: np.ndarray, numbers: np.ndarray) -> Due | None:
         """When a batch closes the open cycle, other than by a cycle's start or end.
 
@@ -90,6 +94,8 @@ class Assembly:
             Their sequence numbers.
         """
         if self._span is None or not t_ns.size:
+            return None
+        if not self.may_be_due(int(t_ns.max())):
             return None
         latest = np.maximum.accumulate(np.where(own, t_ns, self._latest_ns))
         before = np.concatenate(([self._latest_ns], np.maximum(latest[:-1], self._latest_ns)))

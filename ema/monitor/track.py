@@ -33,7 +33,9 @@ class Track:
         if not frames.size:
             return
         numbers = sequence(frames).astype(np.int64)
-        steps = np.diff(numbers, prepend=self._last)
+        steps = numbers.copy()
+        steps[0] -= self._last
+        steps[1:] -= numbers[:-1]
         positions = self._last + np.cumsum((steps + MAX_AHEAD) % N_SEQUENCES - MAX_AHEAD)
         slots = positions % self._frames.size
         self._frames[slots] = frames
