@@ -28,6 +28,24 @@ CANFD_FRAME = np.dtype(
 )
 _CANFD_BRS, _CANFD_ESI = 1, 2  # linux/can.h
 
+# By the upper three bits of the kernel's identifier: what kind of frame, and which bits are the identifier itself.
+_KIND_FLAGS = np.array(
+    [
+        FrameFlag.EXTENDED * (kind >> 2 & 1) | FrameFlag.REMOTE * (kind >> 1 & 1) | FrameFlag.ERROR * (kind & 1)
+        for kind in range(8)
+    ],
+    np.uint8,
+)
+_ID_MASK = np.where(np.arange(8) & 4, np.uint32(socket.CAN_EFF_MASK), np.uint32(socket.CAN_SFF_MASK))
+# By the two lower bits of the kernel's flags of a CAN FD frame.
+_FD_FLAGS = np.array(
+    [
+        FrameFlag.FD | FrameFlag.BRS * (flags & _CANFD_BRS) | FrameFlag.ESI * (flags >> 1 & 1)
+        for flags in range(_CANFD_BRS + _CANFD_ESI + 1)
+    ],
+    np.uint8,
+)
+
 
 class _Iovec(ctypes.Structure):
     _fields_ = [("base", ctypes.c_size_t), ("size", ctypes.c_size_t)]
@@ -101,6 +119,7 @@ class Batch:
     def __init__(self) -> None:
         self.raw = np.zeros(MAX_BATCH, CANFD_FRAME)
         self._control = np.zeros(MAX_BATCH, np.dtype(_Control))
+        self._control_bytes = self._control.view(np.uint8)  # cleared field by field, it would cost ten times as much
         iovecs = np.zeros(MAX_BATCH, np.dtype(_Iovec))
         iovecs["base"] = self.raw.ctypes.data + FD_SIZE * np.arange(MAX_BATCH)
         iovecs["size"] = FD_SIZE
@@ -113,7 +132,7 @@ class Batch:
 
     def receive(self, fileno: int, n_most: int = MAX_BATCH) -> Received:
         """Frames that wait at a non-blocking socket, up to `n_most`; OSError from the kernel, EAGAIN for none."""
-        self._control[:n_most] = 0
+        self._control_bytes[: n_most * self._control.itemsize] = 0
         self._message["control"][:n_most] = self._control_at[:n_most]
         self._message["control_size"][:n_most] = self._control.itemsize
         n = _libc.recvmmsg(fileno, ctypes.c_void_p(self._headers.ctypes.data), n_most, 0, None)
@@ -144,18 +163,11 @@ class Batch:
 def from_kernel(received: Received) -> np.ndarray:
     """Frames in FRAME_DTYPE, error frames included; what is neither of CAN's two sizes must have been taken out."""
     raw, is_fd = received.raw, received.size == FD_SIZE
-    can_id = raw["id"]
-    is_extended = (can_id & socket.CAN_EFF_FLAG) != 0
+    kind = raw["id"] >> 29
     out = np.empty(raw.shape, fr.FRAME_DTYPE)
     out["t_ns"] = received.t_ns
-    out["id"] = can_id & np.where(is_extended, np.uint32(socket.CAN_EFF_MASK), np.uint32(socket.CAN_SFF_MASK))
-    flags = is_extended * np.uint8(FrameFlag.EXTENDED)
-    flags |= ((can_id & socket.CAN_RTR_FLAG) != 0) * np.uint8(FrameFlag.REMOTE)
-    flags |= ((can_id & socket.CAN_ERR_FLAG) != 0) * np.uint8(FrameFlag.ERROR)
-    flags |= is_fd * np.uint8(FrameFlag.FD)
-    flags |= (is_fd & (raw["flags"] & _CANFD_BRS != 0)) * np.uint8(FrameFlag.BRS)
-    flags |= (is_fd & (raw["flags"] & _CANFD_ESI != 0)) * np.uint8(FrameFlag.ESI)
-    out["flags"] = flags
+    out["id"] = raw["id"] & _ID_MASK[kind]
+    out["flags"] = _KIND_FLAGS[kind] | is_fd * _FD_FLAGS[raw["flags"] & 3]
     out["length"] = np.minimum(raw["length"], np.where(is_fd, fr.MAX_DATA, 8))
     out["data"] = raw["data"]
     short = np.flatnonzero(out["length"] < fr.MAX_DATA)
