@@ -168,8 +168,8 @@ def daemon_on_vcan0(vcan0, coarse_bundle):
     """Starts `ema daemon` processes on vcan0: `daemon_on_vcan0(folder)`; ended with the session at the latest."""
     started = []
 
-    def start(folder, **log_settings):
-        started.append(DaemonProcess(vcan0, coarse_bundle.path, folder, log_settings))
+    def start(folder, numbers=(0,), **log_settings):
+        started.append(DaemonProcess(vcan0, dict.fromkeys(numbers, coarse_bundle.path), folder, log_settings))
         return started[-1]
 
     yield start
@@ -180,12 +180,12 @@ def daemon_on_vcan0(vcan0, coarse_bundle):
 class DaemonProcess:
     """An `ema daemon` of its own process, and what it broadcasts."""
 
-    def __init__(self, interface, bundle, folder, log_settings):
+    def __init__(self, interface, bundles, folder, log_settings):
         self.log_folder = folder / "log"
         self.log_folder.mkdir(exist_ok=True)
         settings = {
             "bus": {"interface": "socketcan", "channel": interface},
-            "actuators": {0: {"bundle": str(bundle)}},
+            "actuators": {number: {"bundle": str(bundle)} for number, bundle in bundles.items()},
             "log": {"directory": str(self.log_folder), "flush_interval": 0.2, **log_settings},
         }
         (folder / "daemon.yaml").write_text(yaml.safe_dump(settings))
