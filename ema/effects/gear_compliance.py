@@ -7,9 +7,7 @@ from .base import Effect, Parameter
 EFFECT = Effect(
     name="gear_compliance",
     parameters=(
-        Parameter(
-            "compliance", "rad/(N m)", 0.0, 0.0, 0.0003, 3e-05, "twist of the gear train per torque at the user"
-        ),
+        Parameter("compliance", "rad/(N m)", 0.0, 0.0, 0.0003, 3e-05, "twist of the gear train per torque at the user"),
         Parameter("inertia", "kg m^2", 0.5, 0.05, 3.0, 0.5, "inertia at the user"),
         Parameter("damping", "1", 0.05, 0.005, 0.5, 0.05, "damping ratio of the resonance"),
     ),
