@@ -88,13 +88,17 @@ class Stream:
         return check
 
     def time_out(self, now_ns: int) -> bool:
-        """Whether nothing came in time; counts it, once for each time-out that passes."""
+        """Whether nothing came in time; counts it, once for each time-out that passes.
+
+        The stream then begins anew with whatever comes: a sender that was restarted counts from its beginning.
+        """
         if not self.timeout_ns or now_ns - self.last_ns <= self.timeout_ns:
             return False
         self.last_ns = now_ns
         self.counts.n_timeout += 1
         self.machine.time_out()
         self.steady = False
+        self.expected = -1
         return True
 
     def _judge(self, sequence: int, t_ns: int) -> Check:

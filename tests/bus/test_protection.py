@@ -180,6 +180,16 @@ def test_a_stream_that_stops_times_out_once_for_each_time_out(codec):
     assert receiver.counts.n_timeout == 1
 
 
+def test_a_sender_restarted_within_a_time_out_is_followed_after_it(codec):
+    receiver = Receiver(codec)
+    values = {"u_dc": [48.0] * 5, "temp_w": 20.0}
+    receiver.check(Sender().protect(codec.encode("Supply", 0, values, np.arange(5) * 10**8)))
+    again = Sender().protect(codec.encode("Supply", 0, values, (6 + np.arange(5)) * 10**8))
+    assert receiver.check(again[:2]).tolist() == [AGAIN] * 2
+    receiver.time_outs(10 * 10**8)
+    assert receiver.check(again[2:]).tolist() == [OK] * 3
+
+
 def test_a_long_loss_is_bounded_in_memory(codec, sent):
     receiver = Receiver(codec)
     receiver.check(sent[:: MAX_AHEAD + 1])
