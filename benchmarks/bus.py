@@ -21,6 +21,7 @@ from ema_simulator.traffic import Traffic
 
 from ema.bus import mmsg
 from ema.bus.codec import Codec
+from ema.bus.load import frame_time, load
 from ema.bus.port import RECEIVE_BUFFER, ask_for_buffer
 from ema.bus.protection import Receiver, Sender
 from ema.bus.socketcan import SocketCanPort
@@ -34,6 +35,7 @@ SEED = 11
 N_ACTUATORS = 6
 LIVE, FULL = 30, 500  # frames in a batch: six actuators read every 5 ms; a queue that has filled up
 ROUNDS = 7
+BUS_FULL = round(1.0 / frame_time(64, 1e6, 5e6))  # frames of 64 bytes that a bus of 1 and 5 Mbit/s carries [1/s]
 PEER = "python-can Notifier + cantools decode"
 
 
@@ -76,12 +78,19 @@ def rows() -> list[dict[str, Any]]:
     before, frames = _two_cycles(plant, codec)
     found = []
 
-    def row(figure: str, value: float, limit: float | None = None, peer: str = "", peer_value: float | None = None):
+    def row(
+        figure: str,
+        value: float,
+        limit: float | None = None,
+        peer: str = "",
+        peer_value: float | None = None,
+        unit: str = "µs of CPU/frame",
+    ):
         found.append(
             {
                 "figure": figure,
                 "value": round(value, 2),
-                "unit": "µs of CPU/frame",
+                "unit": unit,
                 "limit": limit,
                 "peer": peer,
                 "peer_value": None if peer_value is None else round(peer_value, 2),
@@ -96,11 +105,14 @@ def rows() -> list[dict[str, Any]]:
             parts = _median_each(lambda size=size: _way_in(before, frames, size, link, codec, plant))
             what = f"batches of {size}, {link.name}"
             row(f"frame in: receive, check, decode, place ({what})", parts[0] + parts[1], 5.0, PEER, peer_value)
+            row(f"  frames one core takes ({what})", 1e6 / sum(parts), BUS_FULL, unit="1/s")
             row(f"  of which receive ({what})", parts[0])
             row(
                 f"  of which check alone (batches of {size})",
                 _median(lambda size=size: _check(before, frames, size, codec)),
             )
+    own = [message for message in codec.messages.values() if message.sender == "Actuator"]
+    row("actuators in their test motion that fill a bus of 1 and 5 Mbit/s", 1.0 / load(own, 1e6, 5e6), unit="1")
     row("frame out: sequence and CRC", _median(lambda: _protect(frames)))
     return found
 
