@@ -8,7 +8,7 @@ STAMP  := $(VENV)/.installed
 .PHONY: demo test test-vcan test-systemd wheel install uninstall check env bench lock clean
 
 demo: env
-	$(BIN)/ema demo --out demo
+	$(BIN)/ema demo --out out/demo
 
 test: env
 	$(BIN)/pytest
