@@ -1,1 +1,0 @@
-"""The whole chain on this machine: runs the other programs, never imports them."""
