@@ -1,0 +1,98 @@
+"""`ema identify`: faults from recorded cycles."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+METHODS = ("linear", "lf2", "lf1", "hf")
+LEVELS = (0.5, 0.9, 0.95)
+
+
+@click.command(short_help="Faults with uncertainties from recorded cycles.")
+@click.option("--bundle", required=True, type=click.Path(path_type=Path), help="what `ema build` made")
+@click.option("--method", type=click.Choice(METHODS), default="lf2", show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Answer for a machine.")
+@click.argument("records", metavar="RECORD...", nargs=-1, required=True, type=click.Path(path_type=Path))
+def identify(bundle: Path, method: str, as_json: bool, records: tuple[Path, ...]) -> None:
+    """Estimate the fault vector of every cycle of the records.
+
+    With the channels theta_u and theta_m the start state of a cycle is measured, else it is left open and the
+    uncertainty grows. Exit status 1 if no cycle gave an estimate.
+
+    \b
+    Example:
+      ema identify --bundle bundle --method lf2 cycles.csv --json
+    """
+    import ema.bundle
+    from ema.core.errors import NegativeAnswer
+    from ema.core.records import read_record
+    from ema.core.status import Status
+    from ema.identification import identifier
+    from ema.identification.recorded import measurements, missing
+
+    made = ema.bundle.load(bundle)
+    sets = [(record, measurements(record, made.plant, made.schedule)) for record in map(read_record, records)]
+    estimator = identifier(method, made)
+    answers: list[dict[str, Any]] = []
+    for record, measured in sets:
+        estimates = [estimator.estimate(m) for m in measured]
+        numbers = [cycle.number for cycle in record]
+        answers.append(
+            {
+                "record": record.name,
+                "missing_channels": list(missing(record)),
+                "cycles": [_answer(n, e) for n, e in zip(numbers, estimates, strict=True)],
+            }
+        )
+    if as_json:
+        click.echo(json.dumps({"method": method, "bundle": str(bundle), "records": answers}, indent=1))
+    else:
+        for answer in answers:
+            _say(answer)
+    if all(c["status"] == Status.NOT_ESTIMATED.name.lower() for a in answers for c in a["cycles"]):
+        raise NegativeAnswer("no cycle gave an estimate")
+
+
+def _answer(number: int, e: Any) -> dict[str, Any]:
+    from ema.core.names import FAULTS
+
+    return {
+        "cycle": number,
+        "k": _finite(e.k),
+        "sd": _finite(e.sd),
+        "intervals": {f"{level:g}": [_finite(row) for row in e.interval(level)] for level in LEVELS},
+        "status": e.status.name.lower(),
+        "reasons": e.reasons.names,
+        "p_value": _finite([e.p_value])[0],
+        "chi2": _finite([e.chi2])[0],
+        "dof": e.dof,
+        "unseparable": [dict(zip(FAULTS, map(float, d.round(3)), strict=True)) for d in e.unseparable],
+    }
+
+
+def _finite(values: Any) -> list[float | None]:
+    """Numbers for JSON, which knows no NaN."""
+    return [float(v) if v == v else None for v in values]
+
+
+def _say(answer: dict[str, Any]) -> None:
+    from ema.core.names import FAULTS
+
+    click.echo(answer["record"])
+    if answer["missing_channels"]:
+        click.echo(f"  not measured: {', '.join(answer['missing_channels'])}")
+    click.echo("  cycle  " + "".join(f"{fault:^17}" for fault in FAULTS) + "  p-value  status")
+    for c in answer["cycles"]:
+        if c["status"] == "not_estimated":
+            click.echo(f"  {c['cycle']:>5}  not estimated: {', '.join(c['reasons'])}")
+            continue
+        values = "".join(f" {k:.4f} ± {sd:.4f} " for k, sd in zip(c["k"], c["sd"], strict=True))
+        reasons = f" ({', '.join(c['reasons'])})" if c["reasons"] else ""
+        click.echo(f"  {c['cycle']:>5}  {values}  {c['p_value']:7.4f}  {c['status']}{reasons}")
+        for direction in c["unseparable"]:
+            terms = " ".join(f"{v:+.2f} {name}" for name, v in direction.items() if abs(v) > 0.1)
+            click.echo(f"         cannot be separated: {terms}")
