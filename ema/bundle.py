@@ -23,7 +23,7 @@ from ema.models.actuator import Actuator
 from ema.models.lf2 import Lf2
 
 FORMAT = "ema-bundle"
-VERSION = 2
+VERSION = 3
 _LF2 = tuple(field.name for field in fields(Lf2) if field.name != "i0")
 SHAPES = {
     "i0": ("n_t",), "v1": ("n_t",), "eigenvalue_share": ("r",), "schedule": ("n_omega",), "A": ("n_omega", 6),
@@ -31,7 +31,8 @@ SHAPES = {
     "noise_switching": ("n_omega", "n_omega"), "noise_start": ("n_omega", "n_omega"), "start_B": ("n_omega", 2),
     "start_scale": (2,), "noise_sizes": ("n_levels",), "noise_linear": ("n_levels", "n_omega", "n_omega"),
     "noise_lf2": ("n_levels", "n_omega", "n_omega"), "error_linear": (N_TERMS, "n_omega"),
-    "error_lf2": (N_TERMS, "n_omega"),
+    "error_lf2": (N_TERMS, "n_omega"), "noise_lf1": ("n_levels", "n_omega", "n_omega"),
+    "error_lf1": (N_TERMS, "n_omega"), "lf1_tuning": (2,),
     "noise_rms": ("n_t",),
     "i_SF": ("n_t",), "i_PH": (3, "n_t"), "f1": ("n_f1",), "f2": ("n_f2",),
     "k2_levels": ("n_k2",), "i_BLK": ("n_k2", "n_t"),

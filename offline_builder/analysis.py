@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from ema.core.names import FAULTS
 from ema.identification.known_error import KnownError
+from ema.models import lf1
 from ema.models.actuator import Actuator
 from ema.models.layout import STATE
 from ema.models.lf2 import Lf2
@@ -40,6 +42,15 @@ def jacobian(
         columns.append(difference / step)
         steps.append(step)
     return np.column_stack(columns), np.array(steps)
+
+
+def tuned(plant: Actuator, i0: np.ndarray) -> lf1.Tuning:
+    """LF1 with the HF model's overall torque, EMF and friction: least squares on the nominal envelope."""
+
+    def misfit(log_factors: np.ndarray) -> np.ndarray:
+        return np.asarray(lf1.simulate(plant, np.zeros((1, 6)), lf1.Tuning(*np.exp(log_factors)))[0] - i0)
+
+    return lf1.Tuning(*np.exp(least_squares(misfit, np.zeros(2), diff_step=0.02).x))
 
 
 def analyse(
@@ -77,7 +88,13 @@ def analyse(
 
     known["linear"] = KnownError.fitted(k, x - linear(k), noise.KNEE)
     levels["linear"] = noise.model_error(linear, sets, S, known["linear"])
-    for name, model in {"lf2": lf2.at(points)}.items():
+    tuning = tuned(plant, i0)
+
+    def lf1_at_points(k: np.ndarray) -> np.ndarray:
+        return lf1.simulate(plant, k, tuning)[:, points]
+
+    models: dict[str, noise.Model] = {"lf2": lf2.at(points), "lf1": lf1_at_points}
+    for name, model in models.items():
         known[name] = error = KnownError.fitted(k, x - model(k), noise.KNEE)
         levels[name] = noise.model_error(noise.corrected(model, error), sets, S, None)
     sizes = [0.0, *(float(np.sqrt(np.mean(np.sum(k**2, axis=1)))) for k, _, _ in sets)]
@@ -91,7 +108,7 @@ def analyse(
         "i0": i0, "noise_rms": noise_rms, "A_full": A_full, "A": A, "A_step": steps, "Q": Q, "R": R,
         "v1": modes.v[:, 0], "eigenvalue_share": modes.share, "schedule": points.astype(np.int64),
         "noise_switching": S, "noise_start": start_rest, "start_B": B, "start_scale": scale,
-        "noise_sizes": np.array(sizes),
+        "noise_sizes": np.array(sizes), "lf1_tuning": tuning.as_array(),
         **{f"noise_{name}": level for name, level in levels.items()},
         **{f"error_{name}": error.coefficients for name, error in known.items()},
         **{name: getattr(lf2, name) for name in Lf2.__dataclass_fields__ if name != "i0"},

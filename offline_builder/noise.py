@@ -22,9 +22,9 @@ def corrected(model: Model, error: KnownError) -> Model:
     return lambda k: model(k) + error(k)
 
 
-def unbiased(S: np.ndarray, n: int) -> np.ndarray:
+def unbiased(S: np.ndarray, n: float) -> np.ndarray:
     """Covariance scaled so that its inverse is right on average (Hartlap et al., A&A 464 (2007) 399)."""
-    return S * (n / max(n - len(S) - 2, 0.2 * n))
+    return S * (n / max(n - len(S) - 2, 0.4 * n))
 
 
 def shrunk(S: np.ndarray, n: int) -> np.ndarray:
@@ -53,7 +53,8 @@ def model_error(model: Model, sets: Sets, S: np.ndarray, known: KnownError | Non
     """M at each size, shape (1 + number of sets, n_omega, n_omega); the first, for no fault, is zero.
 
     Both runs of a pair have the model's error in common and nothing else, so M = E[e₁ e₂ᵀ]. Of its principal
-    directions, measured against the switching covariance `S`, those are kept that stand above what chance puts there.
+    directions, measured against the switching covariance `S`, those are kept that stand above what chance puts there;
+    the others get their mean, in which chance cancels.
     """
     L = np.linalg.cholesky(S)
     levels = [np.zeros_like(S)]
@@ -63,8 +64,10 @@ def model_error(model: Model, sets: Sets, S: np.ndarray, known: KnownError | Non
         M = (e1 / q) @ e2.T / len(k)
         lam, U = np.linalg.eigh(0.5 * (M + M.T))
         chance = np.sqrt(len(S) / len(k)) * float(np.mean(1.0 / q))
-        kept = lam > chance
-        levels.append(L @ (U[:, kept] * lam[kept]) @ U[:, kept].T @ L.T)
+        lam = np.where(lam > chance, lam, max(float(np.mean(lam[lam <= chance])), 0.0))
+        energy = np.abs(np.einsum("ij,ij->j", e1, e2))  # a few large errors are worth few samples
+        n = float(energy.sum() ** 2 / np.sum(energy**2))
+        levels.append(unbiased(L @ (U * lam) @ U.T @ L.T, n))
     return np.array(levels)
 
 

@@ -23,6 +23,7 @@ __all__ = ["METHODS", "Estimate", "Identifier", "Measurement", "identifier"]
 METHODS = {
     "linear": "ema.identification.linear",
     "lf2": "ema.identification.lf2",
+    "lf1": "ema.identification.lf1",
     "hf": "ema.identification.hf",
 }
 

@@ -18,7 +18,7 @@ from .gauss_newton import GaussNewton, Options
 if TYPE_CHECKING:
     from ema.bundle import Bundle
 
-OPTIONS = Options(dk=0.05, central=True, n_base=4, n_steps=5, tolerance=0.1)  # 4 + 2·6 = 16 lanes
+OPTIONS = Options(dk=0.08, central=True, n_base=4, n_steps=5, tolerance=0.1)  # 4 + 2·6 = 16 lanes
 SEED = 0x48460000  # of the model's noise; any but the measured actuator's own
 
 

@@ -53,9 +53,7 @@ def _check(what: str, cycle: Cycle, plant: Actuator) -> None:
         )
     limit = max(np.abs(cycle[c]).max() for c in CURRENTS)
     if limit > 1.01 * plant.sensors.adc_range:
-        raise RecordError(
-            f"{what}: currents reach {limit:g} A, beyond the ±{plant.sensors.adc_range:g} A of '{plant.name}'"
-        )
+        raise RecordError(f"{what}: currents reach {limit:g} A, '{plant.name}' measures ±{plant.sensors.adc_range:g} A")
     if "u_dc" in cycle and abs(np.median(cycle["u_dc"][:n]) / plant.inverter.V_dc - 1.0) > 0.3:
         u_dc = np.median(cycle["u_dc"][:n])
         raise RecordError(f"{what}: bus voltage {u_dc:g} V, '{plant.name}' has {plant.inverter.V_dc:g} V")
