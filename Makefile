@@ -5,10 +5,10 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test test-vcan test-systemd wheel install uninstall check env bench lock clean
+.PHONY: demo test test-vcan test-systemd soak wheel install uninstall check env bench lock clean
 
 demo: env
-	$(BIN)/ema demo --out demo
+	$(BIN)/ema demo --out out/demo
 
 test: env
 	$(BIN)/pytest
@@ -20,6 +20,16 @@ test-vcan: env
 # The service on a machine with a real systemd, in User-Mode Linux (needs tools/install_system_packages).
 test-systemd: env
 	$(BIN)/pytest -m systemd tests/systemd/test_machine.py
+
+# A day's cycles through one daemon as fast as this machine takes them, then SIGKILL many times; needs a bundle.
+SOAK_CYCLES  ?= 86400
+KILL_TRIALS  ?= 100
+soak: env var/bundle/manifest.json
+	$(BIN)/python -m benchmarks.soak --cycles $(SOAK_CYCLES) --bundle var/bundle
+	$(BIN)/python -m benchmarks.kills --trials $(KILL_TRIALS) --bundle var/bundle
+
+var/bundle/manifest.json: config/builder-quick.yaml
+	$(BIN)/ema build --config config/builder-quick.yaml --out var/bundle
 
 check: env
 	$(BIN)/ruff check .

@@ -15,6 +15,7 @@ from ema.bus.interface import open_bus
 from ema.log import LogSettings, LogWriter
 from ema.monitor import Monitor, Runner
 
+from .remote import RemoteRunner
 from .service import Service
 from .settings import DaemonSettings, load_bundles
 from .worker import Worker
@@ -32,7 +33,8 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     codec = default()
     bundles = load_bundles(settings)
     monitor = Monitor(bundles, codec, settings.monitor)
-    runner = Runner(bundles)
+    local = Runner(bundles).run
+    remote = {method: RemoteRunner(path, bundles) for method, path in settings.remote.items()}
     attachments: dict[str, bytes | Path] = {
         codec.path.name: codec.path,
         "daemon.yaml": yaml.safe_dump(settings.model_dump(mode="json"), allow_unicode=True, sort_keys=False).encode(),
@@ -42,7 +44,12 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     with ExitStack() as stack:
         log = stack.enter_context(LogWriter(settings.log.directory, attachments, log_settings))
         port = stack.enter_context(open_bus(settings.bus, codec.filters("Actuator")))
-        workers = {method: Worker(runner.run, settings.queue, method) for method in settings.monitor.slower}
+        for runner in remote.values():
+            stack.callback(runner.close)
+        workers = {
+            method: Worker(remote[method].run if method in remote else local, settings.queue, method)
+            for method in settings.monitor.slower
+        }
         yield Service(monitor, port, log, codec, workers, settings.pace)
 
 

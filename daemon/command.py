@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -23,9 +22,9 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
     # Thirty equations: threads of the linear algebra would only fight for the cores. Read when numpy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     import logging
-    import signal
 
     from ema.bus import interface
+    from ema.core.stopping import on_stop
 
     from .settings import load
 
@@ -40,7 +39,5 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
     from .assembly import assembled
 
     with assembled(settings) as service:
-        stop: Any = lambda *_: service.stop()  # noqa: E731 - a handler takes a signal and a frame
-        signal.signal(signal.SIGTERM, stop)
-        signal.signal(signal.SIGINT, stop)
+        on_stop(service.stop)
         service.run()

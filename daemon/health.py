@@ -85,7 +85,7 @@ class Health:
             "n_cycles": self.monitor.n_cycles,
             "n_estimates": self.monitor.n_estimates,
             **asdict(self.monitor.counts),
-            "n_refused": 0,
+            "n_refused": port.n_refused,
             "kernel_drops": port.kernel_drops,
             "n_received": port.n_received,
             "n_sent": port.n_sent,

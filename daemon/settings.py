@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ema.bundle import Bundle
 from ema.bundle import load as load_bundle
@@ -14,10 +14,12 @@ from ema.core import config
 from ema.core.config import Settings
 from ema.core.errors import BundleError
 from ema.core.units import quantity
+from ema.identification import METHODS
 from ema.log import LogSettings
 from ema.models.actuator import Actuator
 from ema.monitor import MonitorSettings
 
+LOCAL = ("linear", "lf2")  # identifiers that are small enough for the daemon's own process
 Number = Annotated[int, Field(ge=0, le=63)]
 
 
@@ -41,8 +43,18 @@ class DaemonSettings(Settings):
     actuators: dict[Number, ActuatorSettings] = Field(min_length=1, description="by number on the bus")
     log: LogSection
     monitor: MonitorSettings = MonitorSettings()
+    remote: dict[str, str] = Field(
+        default_factory=dict, description="identifiers in a process of their own (`ema hf-worker`): its Unix socket"
+    )
     pace: float = quantity("s", "frames are collected for so long before they are looked at", 3e-3, ge=0, le=0.1)
     queue: int = Field(default=8, ge=1, le=1000, description="cycles that may wait for a slower identifier")
+
+    @model_validator(mode="after")
+    def _somewhere_to_run(self) -> DaemonSettings:
+        for method in self.monitor.slower:
+            if method in METHODS and method not in LOCAL and method not in self.remote:
+                raise ValueError(f"identifier '{method}' needs a process of its own: remote.{method} is its socket")
+        return self
 
 
 def load(path: Path) -> DaemonSettings:
@@ -56,7 +68,8 @@ def load(path: Path) -> DaemonSettings:
         for number, one in settings.actuators.items()
     }
     log = settings.log.model_copy(update={"directory": str(folder / settings.log.directory)})
-    return settings.model_copy(update={"actuators": actuators, "log": log})
+    remote = {method: str(folder / socket) for method, socket in settings.remote.items()}
+    return settings.model_copy(update={"actuators": actuators, "log": log, "remote": remote})
 
 
 def load_bundles(settings: DaemonSettings) -> dict[int, Bundle]:

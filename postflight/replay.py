@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -52,11 +51,10 @@ def replay(
       ema replay /var/log/ema --identify
       ema replay flight.mcap --identify --bundle new-bundle --cycles comparison.csv
     """
-    if bool(onto) == identify:
-        raise click.UsageError("say what for: --onto BUS or --identify")
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: on thirty equations threads only spin
     from .open_log import open_log
 
+    if bool(onto) == identify:
+        raise click.UsageError("say what for: --onto BUS or --identify")
     with open_log(logs, start, end) as log:
         if identify:
             from .reidentify import run

@@ -72,17 +72,16 @@ def _to_csv(scenario: Any, plant: Any, lane: int, path: str, on_cycle: Any) -> N
 
 
 def _to_bus(scenario: Any, plant: Any, on_cycle: Any) -> None:
-    import signal
     import threading
 
     from ema.bus import codec
     from ema.bus.interface import open_bus
+    from ema.core.stopping import on_stop
 
     from .node import run
 
     stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    on_stop(stop.set)
 
     def say(line: str) -> None:
         click.echo(line, err=True)

@@ -108,7 +108,8 @@ def load(path: str | Path) -> tuple[Scenario, Actuator]:
 
 def override(scenario: Scenario, bus: str | None, rate: float | None, n_cycles: int | None) -> Scenario:
     """The scenario with what the command line says otherwise."""
-    said = {"bus": bus and parse(bus), "rate": rate, "n_cycles": n_cycles}
+    place = bus and scenario.bus.model_copy(update=parse(bus).model_dump(exclude={"key_file"}))
+    said = {"bus": place, "rate": rate, "n_cycles": n_cycles}
     return scenario.model_copy(update={key: value for key, value in said.items() if value})
 
 

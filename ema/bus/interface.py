@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import can
@@ -11,6 +12,9 @@ from pydantic import Field
 from ema.core.config import Settings
 from ema.core.errors import BusError
 
+from .authenticated import AuthenticatedPort
+from .authentication import load_key
+from .codec import default
 from .multicast import GROUP, MulticastPort
 from .port import Filters, Port
 from .python_can import PythonCanPort
@@ -25,12 +29,13 @@ class BusSettings(Settings):
     """Where a program meets the others.
 
     `interface` is ``auto`` or an interface of python-can (``socketcan``, ``udp_multicast``, ``virtual``, ``pcan`` …);
-    `options` are passed to that interface as they are.
+    `options` are passed to that interface as they are. With a `key_file` every frame is authenticated, in and out.
     """
 
     interface: str = AUTO
     channel: str = ""
     options: dict[str, Any] = Field(default_factory=dict)
+    key_file: Path | None = None
 
 
 def parse(text: str) -> BusSettings:
@@ -51,8 +56,12 @@ def open_bus(settings: BusSettings, filters: Filters | None = None) -> Port:
     With `filters` only extended identifiers that agree with one of them are received (see `Codec.filters`); on a real
     CAN interface the kernel leaves out the rest before it costs anything.
     """
-    if settings.interface != AUTO:
-        return _open(settings, filters)
+    key = None if settings.key_file is None else load_key(settings.key_file)
+    port = _open(settings, filters) if settings.interface != AUTO else _open_best(settings, filters)
+    return port if key is None else AuthenticatedPort(port, default(), key)
+
+
+def _open_best(settings: BusSettings, filters: Filters | None) -> Port:
     refused = []
     for interface, channel in (("socketcan", VCAN), ("udp_multicast", GROUP), ("virtual", "ema")):
         try:

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from ema.core.config import Settings
 from ema.core.units import quantity
+from ema.identification.fit import DOUBT_LEVEL
 
 
 class Slower(Settings):
@@ -15,9 +16,12 @@ class Slower(Settings):
 
 
 class ModelCheck(Settings):
-    """The model is in doubt when the residuals of several cycles are larger than its noise explains."""
+    """The model is in doubt when the residuals of several cycles are larger than its noise explains.
 
-    level: float = quantity("", "p-value of a residual below which its cycle speaks against it", 1e-3, gt=0, lt=1)
+    An identifier itself marks a single cycle; here is said when that is more than bad luck.
+    """
+
+    level: float = quantity("", "a cycle with a smaller p-value speaks against it", DOUBT_LEVEL, gt=0, lt=1)
     cycles: int = Field(default=5, ge=1, le=1000, description="how many of the last cycles are looked at")
     failures: int = Field(default=3, ge=1, description="so many of them put the model in doubt; none clears it")
 

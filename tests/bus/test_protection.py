@@ -1,11 +1,9 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra import numpy as hnp
 
 from ema.bus import header
-from ema.bus.codec import default
 from ema.bus.protection import GOOD, Check, Receiver, Sender, StreamState
 from ema.bus.stream import MAX_AHEAD, MAX_MISSING, SILENCE_NS
 from ema.core import frames as fr
@@ -198,20 +196,13 @@ def test_a_long_loss_is_bounded_in_memory(codec, sent):
     assert len(stream._missing) <= MAX_MISSING
 
 
-ANY_FRAMES = hnp.arrays(fr.FRAME_DTYPE, st.integers(0, 40))
-
-
-@given(ANY_FRAMES, st.data())
-def test_arbitrary_frames_never_break_the_receiver(frames, data):
-    codec = default()
-    ids = [m.frame_id for m in codec.messages.values()]
-    for frame in frames:
-        if data.draw(st.booleans()):
-            frame["id"] = data.draw(st.sampled_from(ids))
-            frame["flags"] = 9
+@settings(deadline=None)
+@given(st.data())
+def test_arbitrary_frames_never_break_the_receiver(codec, any_frames, data):
     receiver = Receiver(codec)
-    checks = receiver.check(frames)
-    assert checks.size == frames.size
-    assert len(receiver.streams) <= len(ids) * 64
-    for message, part in codec.split(frames[checks <= GOOD]):
-        message.decode(part)
+    for _ in range(2):
+        frames = data.draw(any_frames)
+        checks = receiver.check(frames)
+        assert checks.size == frames.size
+        for message, part in codec.split(frames[checks <= GOOD]):
+            message.decode(part)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ema_daemon.notify import notify
 
 from ema.bus.interface import BusSettings, open_bus
 from ema.log import LogReader
@@ -63,3 +64,14 @@ def test_a_service_from_ready_to_stopped(write_config, manager, bus, frames, tmp
         assert [e["cycle"] for e in estimates] == [0]
         assert estimates[0]["status"] == "valid"
         assert set(log.attachments()) == {"ema.dbc", "daemon.yaml", "manifest.json"}
+
+
+def test_a_service_manager_that_does_not_listen_is_not_waited_for(tmp_path, monkeypatch):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
+        sock.bind(str(tmp_path / "deaf"))
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "deaf"))
+        for _ in range(1000):
+            notify("WATCHDOG=1")
+    notify("WATCHDOG=1")  # gone altogether
+    monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "nothing"))
+    notify("WATCHDOG=1")

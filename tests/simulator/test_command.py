@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ema_simulator.injection import FaultSource
 from ema_simulator.node import run
 from ema_simulator.scenario import load
 
@@ -99,3 +100,42 @@ def test_on_the_bus_at_a_given_rate(write, codec):
     assert summary.n_cycles == 3
     assert frames.size == summary.n_frames == 3 * 2 * (501 + 51 + 10 + 2)
     assert (Receiver(codec).check(frames) == Check.OK).all()
+
+
+def test_authenticated_traffic_is_passed_whole(write, codec, tmp_path):
+    key = tmp_path / "key"
+    key.write_text("00" * 16)
+    key.chmod(0o600)
+    place = parse("virtual:locked").model_copy(update={"key_file": key})
+    scenario, plant = load(write("n_cycles: 1\nrate: 2"))
+    received = []
+    with open_bus(place) as listener, open_bus(place) as port:
+        node = threading.Thread(target=run, args=(scenario, plant, port, codec, threading.Event()), daemon=True)
+        node.start()
+        while node.is_alive():
+            received.append(listener.read(0.02))
+        received.append(listener.read(0.1))
+        assert listener.counters.n_refused == 0
+    frames = np.concatenate(received)
+    assert frames.size == 501 + 51 + 10 + 2
+    assert (Receiver(codec).check(frames) == Check.OK).all()
+
+
+def test_faults_injected_from_another_process_are_taken(write, codec):
+    """Twice: a second call is a sender that has restarted."""
+    scenario, _ = load(write("allow_injection: true\nactuators: [{number: 2}]"))
+    faults = FaultSource(scenario, codec)
+    with open_bus(parse("udp_multicast:239.74.163.55"), codec.filters("Tester")) as port:
+        for k3 in (0.2, 0.3):
+            done = ema("inject", f"k3={k3}", "k1=0.05", "--actuator", 2, "--bus", "udp_multicast:239.74.163.55")
+            assert done.returncode == 0
+            faults.listen(port.read(5.0), t=1.0)
+            assert faults.at(2.0)[0] == pytest.approx([0.05, 0, k3, 0, 0, 0])
+
+
+@pytest.mark.parametrize(("word", "said"), [("k7=0.1", "the faults are"), ("k3=2", "within 0…1"), ("k3", "within 0…1")])
+def test_wrong_faults_are_refused(word, said):
+    done = ema("inject", word, "--bus", "virtual")
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1

@@ -1,0 +1,62 @@
+"""The daemon's side of a worker process."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Mapping
+from contextlib import suppress
+
+from ema.bundle import Bundle
+from ema.identification import Estimate
+from ema.monitor import Job
+
+from . import wire
+from .wire import WireError
+
+
+class RemoteRunner:
+    """Runs jobs in the process that listens on a Unix socket; connects again when that has been restarted.
+
+    Parameters
+    ----------
+    path : str
+        The socket.
+    bundles : mapping of actuator number to Bundle
+    timeout : float
+        For one answer. [s]
+    """
+
+    def __init__(self, path: str, bundles: Mapping[int, Bundle], timeout: float = 60.0):
+        self._path, self._bundles, self._timeout = path, bundles, timeout
+        self._socket: socket.socket | None = None
+
+    def run(self, job: Job) -> Estimate:
+        """The estimate a job asks for; WireError when there is none."""
+        line = wire.pack_job(job, self._bundles[job.actuator])
+        try:
+            answer = self._ask(line)
+        except OSError as error:
+            self.close()
+            raise WireError(f"worker at {self._path} does not answer ({error.strerror or error})") from error
+        return wire.unpack_answer(answer)
+
+    def _ask(self, line: bytes) -> bytes:
+        if self._socket is None:
+            self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
+            self._socket.settimeout(self._timeout)
+            self._socket.connect(self._path)
+        self._socket.sendall(line)
+        answer = bytearray()
+        while not answer.endswith(b"\n"):
+            part = self._socket.recv(1 << 16)
+            if not part or len(answer) > wire.MAX_LINE:
+                raise ConnectionResetError(None, "it has closed the connection")
+            answer += part
+        return bytes(answer)
+
+    def close(self) -> None:
+        """Give the connection up; the next job makes another."""
+        if self._socket is not None:
+            with suppress(OSError):
+                self._socket.close()
+            self._socket = None

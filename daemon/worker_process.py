@@ -1,0 +1,103 @@
+"""`ema hf-worker`: the identifiers that need a compiler, in a process of their own beside the daemon."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+
+from ema.bundle import Bundle
+from ema.core.errors import BusError
+from ema.identification import Estimate
+from ema.monitor import Job, Runner
+
+from . import wire
+from .wire import WireError
+
+_LOOK_UP = 0.2  # how often a stop is looked for [s]
+
+
+class Server:
+    """Answers jobs on a Unix socket, one after the other.
+
+    Parameters
+    ----------
+    path : Path
+        Of the socket; one that nobody listens on any more is replaced. BusError when it cannot be made.
+    bundles : mapping of actuator number to Bundle
+    """
+
+    def __init__(self, path: Path, bundles: Mapping[int, Bundle]):
+        self._path = path
+        self._runner = Runner(bundles)
+        self._fingerprints = {number: wire.fingerprint(bundle) for number, bundle in bundles.items()}
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
+        try:
+            if path.is_socket() and not _listens(path):
+                path.unlink()
+            self._socket.bind(str(path))
+            self._socket.listen(1)
+        except OSError as error:
+            self._socket.close()
+            raise BusError(f"{path}: the worker's socket cannot be made ({error.strerror})") from error
+
+    def run(self, stop: threading.Event) -> None:
+        """Answer until `stop` is set; then remove the socket."""
+        self._socket.settimeout(_LOOK_UP)
+        try:
+            while not stop.is_set():
+                try:
+                    connection, _ = self._socket.accept()
+                except TimeoutError:
+                    continue
+                with connection:
+                    self._serve(connection, stop)
+        finally:
+            self._socket.close()
+            self._path.unlink(missing_ok=True)
+
+    def _serve(self, connection: socket.socket, stop: threading.Event) -> None:
+        connection.settimeout(_LOOK_UP)
+        waiting = bytearray()
+        while not stop.is_set():
+            try:
+                part = connection.recv(1 << 16)
+            except TimeoutError:
+                continue
+            except OSError:
+                return
+            waiting += part
+            if not part or len(waiting) > wire.MAX_LINE:
+                return
+            while b"\n" in waiting:
+                line, _, waiting = waiting.partition(b"\n")
+                try:
+                    connection.settimeout(None)
+                    connection.sendall(wire.pack_answer(self._answer(bytes(line))))
+                    connection.settimeout(_LOOK_UP)
+                except OSError:
+                    return
+
+    def _answer(self, line: bytes) -> Estimate | Exception:
+        try:
+            job, fingerprint = wire.unpack_job(line)
+            if self._fingerprints.get(job.actuator) != fingerprint:
+                return WireError(f"the worker has another bundle for actuator {job.actuator}")
+            return self._runner.run(job)
+        except Exception as error:  # the answer, whatever it is
+            return error
+
+    def prepare(self, jobs: list[Job]) -> None:
+        """Run jobs once, so that whatever is compiled is compiled before the first real one."""
+        for job in jobs:
+            self._runner.run(job)
+
+
+def _listens(path: Path) -> bool:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        try:
+            probe.connect(str(path))
+        except OSError:
+            return False
+        return True

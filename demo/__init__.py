@@ -1,0 +1,1 @@
+"""The whole chain on this machine: runs the other programs, never imports them."""

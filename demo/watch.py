@@ -1,0 +1,49 @@
+"""What the demo shows while it flies: the estimates as they come over the bus."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from ema.bus import codec
+from ema.bus.interface import open_bus, parse
+from ema.core.names import FAULTS
+from ema.core.status import Status
+
+
+class Watch:
+    """Listens to the monitor's frames on the bus, as any other node could."""
+
+    def __init__(self, bus: str, n_cycles: int, console: Console):
+        self._codec = codec.default()
+        self._port = open_bus(parse(bus), self._codec.filters("Monitor"))
+        self._bar = Progress(
+            TextColumn("[bold]flight[/]"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+            TextColumn("{task.description}"), console=console,
+        )  # fmt: skip
+        self._task = self._bar.add_task("simulator starts", total=n_cycles)
+
+    def look(self, duration: float) -> None:
+        """Show what comes within `duration` [s]."""
+        end = time.monotonic() + duration
+        while (left := end - time.monotonic()) > 0:
+            for message, frames in self._codec.split(self._port.read(left)):
+                if message.name == "EstimateLinear":
+                    values = message.decode(frames)
+                    k = "  ".join(f"{name} {x:.3f}" for name, x in zip(FAULTS, values["k"][-1], strict=True))
+                    status = Status(int(values["status"][-1])).name.lower()
+                    self._bar.update(self._task, advance=len(frames), description=f"{k}  {status}")
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bar.stop()
+        self._port.close()

@@ -1,0 +1,164 @@
+"""Every effect of the library as something to try on a three-phase actuator: probes for a first look, and what to fit.
+
+A *probe* is a point with the effect switched on by a known amount; differences of probes from the nominal simulation
+are the columns with which all candidates are screened at once, linearly. Only the best few are then fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema.effects import registry
+
+from .cycles import Measured
+from .features import Array
+from .fit import Free, free
+from .plant import Point
+from .weak import Torque, bumps, lines
+
+WARMER = 3.0  # [K] spread of winding temperature below which nothing can be said about temperature
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect with its nonlinear parameters near some value.
+
+    Attributes
+    ----------
+    effect : str
+    frees : tuple of Free
+        Parameters to fit.
+    fixed : Mapping
+        Values of parameters in the probes: those that are not linear.
+    linear : tuple of str
+        Parameters that the effect is (nearly) proportional to; one probe each.
+    """
+
+    effect: str
+    frees: tuple[Free, ...]
+    fixed: Mapping[str, float]
+    linear: tuple[str, ...]
+    steps: tuple[float, ...]
+
+    @property
+    def key(self) -> str:
+        """Distinct for candidates with other probes."""
+        return self.effect + "".join(f" {name}={value:.4g}" for name, value in sorted(self.fixed.items()))
+
+    @property
+    def amounts(self) -> Array:
+        """By how much each probe differs from neutral."""
+        neutral = registry()[self.effect].neutral()
+        return np.array([s - neutral[name] for name, s in zip(self.linear, self.steps, strict=True)])
+
+    def probes(self) -> list[Point]:
+        """One point for each column."""
+        return [
+            {**{f"{self.effect}.{n}": v for n, v in self.fixed.items()}, f"{self.effect}.{name}": step}
+            for name, step in zip(self.linear, self.steps, strict=True)
+        ]
+
+    def limits(self) -> tuple[Array, Array]:
+        """Bounds of the linear parameters, less neutral."""
+        parameters = {p.name: p for p in registry()[self.effect].parameters}
+        chosen = [parameters[name] for name in self.linear]
+        return np.array([p.low - p.neutral for p in chosen]), np.array([p.high - p.neutral for p in chosen])
+
+    def start(self, values: Array) -> Point:
+        """The point to begin a fit from, given the linear parameters' values (less neutral)."""
+        neutral = registry()[self.effect].neutral()
+        point = {f"{self.effect}.{name}": value for name, value in self.fixed.items()}
+        for name, value in zip(self.linear, values, strict=True):
+            point[f"{self.effect}.{name}"] = neutral[name] + value
+        return {f.name: float(np.clip(point[f.name], f.low, f.high)) for f in self.frees} | {
+            name: value for name, value in point.items() if name not in {f.name for f in self.frees}
+        }
+
+
+@dataclass(frozen=True)
+class Line(Candidate):
+    """A torque line: linear in A cos φ and A sin φ."""
+
+    @property
+    def amounts(self) -> Array:
+        """Amplitude of both probes."""
+        return np.repeat(np.array(self.steps), 2)
+
+    def probes(self) -> list[Point]:
+        """Sine and cosine of the line."""
+        on = {f"{self.effect}.{n}": v for n, v in self.fixed.items()} | {f"{self.effect}.amplitude": self.steps[0]}
+        return [{**on, f"{self.effect}.phase": 0.0}, {**on, f"{self.effect}.phase": 0.5 * np.pi}]
+
+    def limits(self) -> tuple[Array, Array]:
+        """Of A cos φ and A sin φ."""
+        high = next(p.high for p in registry()[self.effect].parameters if p.name == "amplitude")
+        return np.full(2, -high), np.full(2, high)
+
+    def start(self, values: Array) -> Point:
+        """Amplitude and phase from A cos φ and A sin φ."""
+        found = {
+            "amplitude": float(np.hypot(values[0], values[1])),
+            "phase": float(np.arctan2(values[1], values[0])),
+            **self.fixed,
+        }
+        return {f"{self.effect}.{name}": value for name, value in found.items()}
+
+
+def _plain(effect: str, *names: str, step: Mapping[str, float] | None = None, **fixed: float) -> Candidate:
+    """Linear in `names`; `fixed` are fitted too, from the given values."""
+    parameters = {p.name: p for p in registry()[effect].parameters}
+    steps = tuple((step or {}).get(n, parameters[n].start - parameters[n].neutral) for n in names)
+    frees = [free(f"{effect}.{n}", s) for n, s in zip(names, steps, strict=True)]
+    frees += [free(f"{effect}.{n}", 0.15 * value or 0.1 * parameters[n].start) for n, value in fixed.items()]
+    at = tuple(parameters[n].neutral + s for n, s in zip(names, steps, strict=True))
+    return Candidate(effect, tuple(frees), fixed, names, at)
+
+
+def candidates(data: Measured, torques: Sequence[Torque]) -> list[Candidate]:
+    """What to try on these cycles; nonlinear parameters where the residual torque suggests them."""
+    found = [
+        _plain("asymmetric_friction", "asymmetry"),
+        _plain("clock_skew", "rate", step={"rate": 1e-4}),
+        _plain("commutation_offset", "angle"),
+        _plain("constant_load", "torque"),
+        _plain("current_gain", "gain_a", "gain_b", "gain_c", step=dict.fromkeys(("gain_a", "gain_b", "gain_c"), 0.02)),
+        _plain("current_offset", "offset_a", "offset_b", "offset_c"),
+        _plain("dead_time", "time"),
+        _plain("load_friction", "per_torque"),
+        _plain("magnet_flux", "change"),
+        _plain("position_delay", "time"),
+        _plain("quadratic_drag", "coefficient"),
+        _plain("resolver_error", "once_cosine", "once_sine", "twice_cosine", "twice_sine"),
+        _plain("saturation", "emf", "inductance"),
+        _plain("speed_delay", "time"),
+        _plain("spring_load", "stiffness"),
+        *(_plain("stribeck", "excess", speed=speed) for speed in (4.0, 15.0, 40.0)),
+        _plain("viscous_drag", "coefficient"),
+        _plain("winding_resistance", "change"),
+        *(
+            _plain("gear_compliance", "compliance", step={"compliance": c}, inertia=inertia, damping=0.05)
+            for c in (5e-6, 3e-5, 1e-4)
+            for inertia in (0.2, 0.8)
+        ),
+    ]
+    if all(s.u_dc is not None for s in data.signals):
+        found.append(_plain("supply_sag", "resistance"))
+    if np.ptp(data.dT) > WARMER:
+        found.append(_plain("magnet_flux", "per_kelvin"))
+        found.append(_plain("winding_resistance", "per_kelvin"))
+    top = max(float(np.abs(s.i).max()) for s in data.signals)
+    if any(int((np.abs(s.i) > top - 0.02).sum()) >= 5 for s in data.signals):
+        found.append(_plain("adc_saturation", "limit", step={"limit": top - 30.0}))
+    for order, _ in lines(torques):
+        frees = (
+            free("cogging.amplitude", 0.002),
+            Free("cogging.order", max(order - 0.6, 1.0), order + 0.6, 0.04),
+            Free("cogging.phase", -2.0 * np.pi, 2.0 * np.pi, 0.3),
+        )
+        found.append(Line("cogging", frees, {"order": order}, ("amplitude",), (0.005,)))
+    for centre, width in bumps(torques):
+        found.append(_plain("position_friction", "height", centre=centre, width=width))
+    return found

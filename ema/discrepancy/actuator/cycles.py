@@ -1,0 +1,219 @@
+"""Measured cycles of a three-phase actuator: checked, and grouped into motions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema.core.errors import RecordError
+from ema.core.records import Cycle, Record, require
+from ema.models.actuator import Actuator
+from ema.models.envelope import envelope
+
+from .features import Array, Signals, features, motor_torque, stacked
+
+REQUIRED = ("t", "i_a", "i_b", "i_c", "theta_m", "theta_u", "theta_cmd")
+T_20 = 20.0  # [°C] temperature of the nominal parameters
+MIN_DURATION = 0.2  # [s]
+MAX_LAG = 6e-3  # [s] no sensor or loop of this plant is that late; channels are apart
+MAX_CLIPPED = 0.1  # share of samples at the largest value
+AT_REST = 1e-3  # [s] at the start of a cycle, over which the position is averaged
+
+
+@dataclass(frozen=True)
+class Measured:
+    """All cycles of the records, as the engine wants them.
+
+    Attributes
+    ----------
+    labels : tuple of str
+    commands : list of arrays
+        Commanded user position of each *motion*. [rad]
+    motion : array of int, shape (n_cycles,)
+        Which motion each cycle is.
+    signals : list of Signals
+        One run each.
+    y : list of arrays, shape (n_features,)
+        Features of each cycle.
+    envelopes : list of arrays
+        [A]
+    start : array, shape (n_cycles, 2)
+        θ_u and θ_m at the start. [rad]
+    dT : array, shape (n_cycles,)
+        Winding temperature less 20 °C; zero where it was not recorded. [K]
+    has_temperature : bool
+    angle_step : float
+        Resolution of the recorded rotor angle, 0 if finer than can be seen. [rad]
+    """
+
+    labels: tuple[str, ...]
+    commands: list[Array]
+    motion: NDArray[np.int64]
+    signals: list[Signals]
+    y: list[Array]
+    envelopes: list[Array]
+    start: Array
+    dT: Array
+    has_temperature: bool
+    angle_step: float
+
+    @property
+    def n_cycles(self) -> int:
+        """Number of cycles."""
+        return len(self.labels)
+
+
+def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
+    """Check the records against the plant and prepare them; RecordError says in one line what is wrong."""
+    commands: list[Array] = []
+    motion, labels, everything = [], [], []
+    with_supply = all("u_dc" in record.channels for record in records)
+    with_temperature = all("temp_w" in record.channels for record in records)
+    for record in records:
+        require(
+            record,
+            REQUIRED,
+            min_samples=int(MIN_DURATION * plant.control.rate),
+            varying=("theta_cmd", "theta_m", "theta_u", "i_a", "i_b", "i_c"),
+        )
+        for cycle in record.cycles:
+            where = f"{record.name}: {cycle}"
+            _check_rate(where, cycle, plant)
+            s = _signals(cycle, with_supply)
+            _check_motion(where, s, plant)
+            _check_clipping(where, s, plant)
+            _check_synchrony(where, s, plant)
+            command = cycle["theta_cmd"]
+            motion.append(_motion(commands, command, plant))
+            labels.append(where)
+            everything.append((s, cycle))
+    signals = [s for s, _ in everything]
+    rest = max(1, round(AT_REST * plant.control.rate))
+    start = np.array([[s.theta_u[0, :rest].mean(), s.theta_m[0, 0]] for s in signals])
+    dT = np.array([cycle["temp_w"].mean() - T_20 if with_temperature else 0.0 for _, cycle in everything])
+    return Measured(
+        tuple(labels),
+        commands,
+        np.array(motion, dtype=np.int64),
+        signals,
+        [stacked(features(plant, s))[0] for s in signals],
+        [envelope(s.i, plant.control.rate)[0] for s in signals],
+        start,
+        dT,
+        with_temperature,
+        _step(np.concatenate([s.theta_m[0] for s in signals])),
+    )
+
+
+def _signals(cycle: Cycle, with_supply: bool) -> Signals:
+    return Signals(
+        np.stack([cycle["i_a"], cycle["i_b"], cycle["i_c"]])[None],
+        cycle["theta_m"][None],
+        cycle["theta_u"][None],
+        cycle["theta_cmd"][None],
+        cycle["u_dc"][None] if with_supply else None,
+    )
+
+
+def _motion(commands: list[Array], command: Array, plant: Actuator) -> int:
+    """Index of the motion with this command (to the resolution of the position sensor); appended if new."""
+    for index, known in enumerate(commands):
+        if len(known) == len(command) and np.abs(known - command).max() <= plant.sensors.lvdt_step:
+            return index
+    commands.append(command)
+    return len(commands) - 1
+
+
+def _step(x: Array) -> float:
+    """Resolution of a channel: the smallest step between its values if all values are multiples of it, else 0."""
+    values = np.unique(x)
+    if len(values) < 3:
+        return 0.0
+    step = float(np.diff(values).min())
+    if step < 1e-6:
+        return 0.0
+    off = np.diff(values) / step
+    return step if np.abs(off - np.round(off)).max() < 0.02 else 0.0
+
+
+def _check_rate(where: str, cycle: Cycle, plant: Actuator) -> None:
+    rate = 1.0 / cycle.period
+    if abs(rate / plant.control.rate - 1.0) > 0.03:
+        raise RecordError(f"{where}: is sampled at {rate:.4g} Hz, the plant's recorder at {plant.control.rate:.4g} Hz")
+    longest = float(np.diff(cycle["t"]).max())
+    if longest > 1.5 * cycle.period:
+        raise RecordError(f"{where}: has a gap of {longest:.3g} s (samples are {cycle.period:.3g} s apart)")
+
+
+def _check_motion(where: str, s: Signals, plant: Actuator) -> None:
+    for name, x in (("theta_cmd", s.theta_cmd), ("theta_m", s.theta_m), ("theta_u", s.theta_u)):
+        if np.ptp(x) == 0.0:
+            raise RecordError(f"{where}: {name} is constant; a cycle in motion is needed")
+    for j, phase in enumerate("abc"):
+        if np.ptp(s.i[0, j]) <= 6.0 * plant.sensors.current_noise:
+            raise RecordError(f"{where}: i_{phase} is constant; a cycle under current is needed")
+    x, y = s.theta_m[0] / plant.transmission.GR, s.theta_u[0]
+    x, y = x - x.mean(), y - y.mean()
+    slope = float(x @ y) / float(x @ x)
+    if not 0.5 < slope < 1.5:
+        raise RecordError(
+            f"{where}: θ_u moves {slope:.3g} times θ_m/GR with the plant's GR = {plant.transmission.GR:g}: "
+            "a record of another plant, or a wrong unit or sign"
+        )
+
+
+def _check_clipping(where: str, s: Signals, plant: Actuator) -> None:
+    step = 2.0 * plant.sensors.adc_range / 2**plant.sensors.adc_bits
+    for j, phase in enumerate("abc"):
+        x = np.abs(s.i[0, j])
+        top = float(x.max())
+        share = float(np.mean(x >= top - 0.5 * step))
+        if top >= plant.sensors.adc_range - 1.5 * step or (share > MAX_CLIPPED and top > 0.5):
+            raise RecordError(
+                f"{where}: i_{phase} is clipped at {top:.3g} A in {share:.1%} of its samples (ADC range "
+                f"±{plant.sensors.adc_range:g} A); a record with less current or a wider range is needed"
+            )
+
+
+def _check_synchrony(where: str, s: Signals, plant: Actuator) -> None:
+    """Channels that belong together must not be apart by more than any sensor or loop can be late."""
+    rate = plant.control.rate
+    reach = int(0.05 * rate)
+    tau = motor_torque(plant, s)[0][0]
+    w_m = np.gradient(s.theta_m[0], 1.0 / rate)
+    c = plant.control
+    I_ref = np.clip(
+        c.K_w * (c.K_p * (s.theta_cmd[0] - s.theta_u[0]) - w_m), -plant.inverter.I_max, plant.inverter.I_max
+    )
+    pairs = (
+        ("the currents", "position and command", tau, I_ref),
+        ("θ_u", "θ_m", s.theta_u[0], s.theta_m[0]),
+    )
+    for late, early, x, y in pairs:
+        lag, correlation = _lag(x, y, reach)
+        if abs(lag) > MAX_LAG * rate:
+            side = "after" if lag > 0 else "before"
+            raise RecordError(
+                f"{where}: {late} come {abs(lag) / rate:.3g} s {side} {early}: channels are not synchronised"
+            )
+        if correlation < 0.5:
+            raise RecordError(
+                f"{where}: {late} do not follow {early} (correlation {correlation:.2f}): a record of another plant, "
+                "a wrong sign, or channels that do not belong together"
+            )
+
+
+def _lag(x: Array, y: Array, reach: int) -> tuple[int, float]:
+    """Samples by which `x` is later than `y` where they agree best, and their correlation there."""
+    best = (0, -1.0)
+    for lag in range(-reach, reach + 1, 5):
+        a, b = (x[lag:], y[: len(y) - lag]) if lag >= 0 else (x[:lag], y[-lag:])
+        a, b = a - a.mean(), b - b.mean()
+        scale = float(np.sqrt((a @ a) * (b @ b)))
+        r = float(a @ b) / scale if scale > 0.0 else 0.0
+        if r > best[1] + 1e-6:
+            best = (lag, r)
+    return best

@@ -1,0 +1,206 @@
+"""The whole examination of an actuator's cycles: verdict, effects, structure, gain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from ema.core.errors import RecordError
+from ema.core.names import FAULTS
+from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
+from ema.effects import registry
+from ema.models.actuator import Actuator
+
+from .cycles import Measured
+from .fit import Fit
+from .noise import Noise, Verdict
+from .plant import ENVELOPE_STEP, EmaPlant, Point
+from .select import FINAL_SEED, MAX_EFFECTS, N_FINAL, Model, Search, start_model
+from .structure import structure
+
+MIN_CYCLES = 2
+WORTH_IT = 0.25  # share of what is left that a further effect must take on held-out cycles
+ENOUGH = 0.1  # share of what faults alone leave, from which effects explain it but for the form of their laws
+STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
+ALIKE = 1.6  # factor within which what two models leave is alike: laws are approximations
+SLACK = 0.1  # misfit that switching noise may make
+ENVELOPE_SETTLING = 15e-3  # [s]
+FAULT_ALARM = 0.02  # a fault that an operator would be told of
+NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none
+
+
+@dataclass(frozen=True)
+class Examination:
+    """The answer with what the report draws."""
+
+    findings: Findings
+    search: Search
+    before: Model
+    after: Model
+    verdict_before: Verdict
+    verdict_after: Verdict
+
+
+def split(data: Measured) -> tuple[list[int], list[int]]:
+    """Training and held-out cycles: of every motion the last third, at least one where there are two."""
+    train, heldout = [], []
+    for motion in range(len(data.commands)):
+        cycles = np.flatnonzero(data.motion == motion).tolist()
+        n = len(cycles) // 3 or len(cycles) // 2
+        train += cycles[: len(cycles) - n]
+        heldout += cycles[len(cycles) - n :]
+    if not heldout:  # every motion once: every second motion is held out
+        train, heldout = sorted(train)[::2], sorted(train)[1::2]
+    return sorted(train), sorted(heldout)
+
+
+def examine(
+    plant: Actuator, data: Measured, *, n_threads: int = 2, say: Callable[[str], None] = lambda t: None
+) -> Examination:
+    """What the simulation of `plant` gets wrong about `data`."""
+    if data.n_cycles < MIN_CYCLES:
+        raise RecordError(
+            f"{data.labels[0]}: is the only cycle; at least {MIN_CYCLES} are needed, to test on one what another says"
+        )
+    train, heldout = split(data)
+    ema = EmaPlant(plant, data, n_threads)
+    say("switching noise")
+    search = Search(ema, Noise(ema, {}), train, heldout, say)
+    before = start_model(search)
+    search.noise = Noise(ema, before.fit.point)
+    v = verdict_before = search.verdict(before)
+    say(f"faults only: p = {v.p_value:.2g}, most visible: {v.loudest}")
+    after = before
+    alike: list[tuple[str, ...]] = []
+    while not v.is_noise and len(after.effects) < MAX_EFFECTS:
+        enough = after is not before and after.excess < ENOUGH * before.excess + SLACK
+        models = search.extend(after)
+        best = models[0]
+        taken = (after.excess - best.excess) / max(after.excess, 1e-9)
+        if taken < (STRONG if enough else WORTH_IT):
+            break
+        alike.append(tuple(m.names[-1] for m in models[1:] if m.excess < ALIKE * best.excess + 0.02))
+        after = best
+        if after.excess < 1.0:
+            search.noise = Noise(ema, after.fit.point)
+        v = search.verdict(after)
+        say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
+    return Examination(_findings(search, before, after, v, alike), search, before, after, verdict_before, v)
+
+
+def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]]) -> Findings:
+    odd = [c for c in after.effects if c.effect == "cogging" and not _integer(after.fit)]
+    explained = v.is_noise or after.excess < ENOUGH * before.excess + SLACK
+    verdict: Literal["adequate", "explained", "unexplained"] = (
+        "adequate" if not after.effects and v.is_noise else "explained" if explained and not odd else "unexplained"
+    )
+    notes: list[str] = []
+    shape: dict[str, Any] = {}
+    if verdict == "unexplained" or (after.effects and not v.is_noise):
+        base = Model((), before.fit, before.heldout) if odd else after
+        shape = structure(search.torques(base), search.plant.plant.control.rate, v.scores)
+    if verdict == "explained" and not v.is_noise:
+        notes.append("a small rest above noise is left: the true law has another form than the library's")
+    if not search.plant.data.has_temperature:
+        notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
+    kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c not in odd]
+    found = [_found(search, after, c.effect, a) for c, a in kept]
+    if odd:
+        at = after.fit.point["cogging.order"]
+        notes.append(f"a torque line at the non-integer order {at:.4g} is no cogging of this motor")
+        shape["orders"] = [
+            {
+                "order": at,
+                "amplitude": after.fit.point["cogging.amplitude"],
+                "share": 1.0 - after.excess / before.excess,
+            }
+        ]
+        shape["sentences"] = [
+            f"a torque line of {after.fit.point['cogging.amplitude']:.2g} N m at {at:.4g} periods per rotor turn"
+        ]
+    tried = [
+        {"name": " + ".join(m.names) or "faults only", "score": -m.heldout}
+        for m in sorted(search.tried, key=lambda m: m.heldout)
+    ]
+    return Findings(verdict, found, _gain(search, before, after), shape, tried, notes)
+
+
+def _integer(fit: Fit) -> bool:
+    order = fit.point["cogging.order"]
+    sd = interval(fit, "cogging.order")
+    return abs(order - round(order)) < max(NON_INTEGER, 3.0 * sd)
+
+
+def interval(fit: Fit, name: str) -> float:
+    """Standard deviation of a parameter, as much larger as the fit is worse than noise."""
+    j = [f.name for f in fit.free].index(name)
+    return float(np.sqrt(fit.covariance[j, j] * max(fit.misfit, 1.0)))
+
+
+def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...]) -> FoundEffect:
+    e = registry()[effect]
+    fit = model.fit
+    bounds = {f.name: f for f in fit.free}
+    values = {p.name: fit.point.get(f"{effect}.{p.name}", p.neutral) for p in e.parameters}
+    parameters = {}
+    for p in e.parameters:
+        name = f"{effect}.{p.name}"
+        if name in bounds:
+            sd, f = interval(fit, name), bounds[name]
+            parameters[p.name] = Quantity(
+                values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
+            )
+    return FoundEffect(
+        effect, _confidence(search, model, effect), alike, parameters, e.sentence.format(**values), e.separated_by
+    )
+
+
+def _confidence(search: Search, model: Model, effect: str) -> float:
+    """Odds of this effect against what else was tried in its place, by held-out misfit; a library is never complete."""
+    place = model.names.index(effect)
+    n = sum(len(search.plant.data.y[c]) for c in search.heldout)
+    best: dict[str, float] = {}
+    for m in search.tried:
+        if len(m.names) > place and m.names[:place] == model.names[:place] and len(m.names) == place + 1:
+            best[m.names[place]] = min(m.heldout, best.get(m.names[place], np.inf))
+    own = best.get(effect, model.heldout)
+    weights = [np.exp(-0.5 * min(n * (x - own) / max(own, 1.0), 1400.0)) for x in best.values()]
+    return float(0.99 / max(sum(weights), 1.0))
+
+
+def settled(plant: EmaPlant) -> int:
+    """First sample of the envelope that the low-pass no longer ties to the unknown current at the start."""
+    return round(ENVELOPE_SETTLING * plant.plant.control.rate) // ENVELOPE_STEP
+
+
+def envelope_error(search: Search, point: Point, cycles: list[int]) -> float:
+    """Rms of measured less mean simulated envelope over cycles. [A]"""
+    plant = search.plant
+    total = []
+    for c in cycles:
+        runs = plant.simulate([point] * N_FINAL, [c] * N_FINAL, range(FINAL_SEED, FINAL_SEED + N_FINAL))
+        error = plant.data.envelopes[c][::ENVELOPE_STEP] - runs.envelopes.mean(axis=0)
+        total.append(np.mean(error[settled(plant) :] ** 2))
+    return float(np.sqrt(np.mean(total)))
+
+
+def _gain(search: Search, before: Model, after: Model) -> Gain:
+    floor = np.sqrt(
+        np.mean([np.mean(search.noise.of(c).envelope_sd[settled(search.plant) :] ** 2) for c in search.heldout])
+        * (1.0 + 1.0 / N_FINAL)
+    )
+    k_before, k_after = (tuple(round(m.fit.point.get(n, 0.0), 5) for n in FAULTS) for m in (before, after))
+    return Gain(
+        envelope_error(search, before.fit.point, search.train),
+        envelope_error(search, after.fit.point, search.train),
+        envelope_error(search, before.fit.point, search.heldout),
+        envelope_error(search, after.fit.point, search.heldout),
+        float(floor),
+        k_before,
+        k_after,
+        sum(x > FAULT_ALARM for x in k_before),
+        sum(x > FAULT_ALARM for x in k_after),
+    )

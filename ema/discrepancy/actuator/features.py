@@ -1,0 +1,189 @@
+"""What of a cycle is compared: numbers that feel physics, and not the luck of each switching instant.
+
+Two runs of the same actuator differ, sample by sample, by what decides its comparators. So a cycle is reduced to
+short local averages of *balances*, each of which holds by itself and points at one part of the actuator:
+
+=========  =====================================================================  ============================
+torque     Σ κ_j i_j - J dω_m/dt - C ω_m, in weak form                            motor, friction, load
+control    current less what the controller should ask for                        delays, sensors, controller
+current    DC-equivalent current, signed                                          everything; carries the faults
+tracking   θ_u - θ_cmd                                                            closed loop
+gap        θ_m/GR - θ_u less its mean                                             gear: backlash, compliance
+sum        i_a + i_b + i_c, which is zero in the motor                            current sensors
+phase      currents by phase and electrical angle, plain and by sign of current   asymmetry, commutation, inverter
+supply     u_dc                                                                   supply
+=========  =====================================================================  ============================
+
+They are computed alike from measured and from simulated cycles; constants in them are nominal, so they are zero for
+neither: it is the difference that counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, vectorize
+from numpy.typing import NDArray
+
+from ema.effects.trapezoid import six_step, trap
+from ema.models.actuator import Actuator
+
+Array = NDArray[np.float64]
+
+SECTORS = 24  # per electrical turn
+I_SIGN = 0.3  # [A] current at which its sign is taken for half certain
+MAX_NODES = 800
+SETTLING = 5e-3  # [s] left out at the start of a cycle: what current the controller held before it is not known
+# Local averages: distance of nodes [s], and the smallest standard deviation a feature is trusted with: what the
+# sensors resolve, and what two honest implementations of the same equations may differ by.
+GROUPS = {
+    "torque": (1e-3, 1.0e-4, "N m"),
+    "control": (2e-3, 2.0e-3, "A"),
+    "current": (2e-3, 2.0e-3, "A"),
+    "tracking": (2.5e-3, 5.0e-7, "rad"),
+    "gap": (5e-3, 3.0e-7, "rad"),
+    "sum": (25e-3, 3.0e-4, "A"),
+    "phase": (0.0, 2.0e-3, "A"),
+    "supply": (50e-3, 0.05, "V"),
+}
+
+_trap = vectorize(nopython=True)(lambda x: trap(x))
+_six_step = vectorize(nopython=True)(lambda x: six_step(x))
+PHASE = np.array([0.0, 2.0, 4.0])[:, None] * np.pi / 3.0
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Channels of n runs or cycles of one length; batch axis first.
+
+    Attributes
+    ----------
+    i : array, shape (n, 3, n_times)
+        Phase currents. [A]
+    theta_m, theta_u, theta_cmd : arrays, shape (n, n_times)
+        [rad]
+    u_dc : array, shape (n, n_times), or None
+        Bus voltage, where it was recorded. [V]
+    """
+
+    i: Array
+    theta_m: Array
+    theta_u: Array
+    theta_cmd: Array
+    u_dc: Array | None
+
+
+def spacing(seconds: float, rate: float, n_times: int) -> int:
+    """Samples from one node to the next."""
+    return max(round(seconds * rate), 2, n_times // MAX_NODES)
+
+
+def local_mean(x: Array, m: int) -> Array:
+    """Averages over triangles of ±m samples around every m-th sample but the first and last, (..., n_nodes)."""
+    weight = (1.0 - np.abs(np.arange(-m + 1, m)) / m) / m
+    n_nodes = (x.shape[-1] - 1) // m - 1
+    at = (np.arange(1, n_nodes + 1) * m)[:, None] + np.arange(-m + 1, m)
+    return np.asarray(x[..., at] @ weight)
+
+
+def nodes(x: Array, m: int) -> Array:
+    """Values at the middle of the triangles of `local_mean`."""
+    n_nodes = (x.shape[-1] - 1) // m - 1
+    return np.asarray(x[..., m : m * (n_nodes + 1) : m])
+
+
+def acceleration(theta: Array, m: int, T: float) -> Array:
+    """Triangle-weighted mean of d²θ/dt²: exact for any course of θ, from its values at the nodes. [rad/s²]"""
+    n_nodes = (theta.shape[-1] - 1) // m - 1
+    x = theta[..., : m * (n_nodes + 1) + 1 : m]
+    return np.asarray((x[..., 2:] - 2.0 * x[..., 1:-1] + x[..., :-2]) / (m * T) ** 2)
+
+
+def delayed(x: Array, samples: float) -> Array:
+    """The signal a (fractional) number of samples ago; before the start its first value."""
+    whole = int(samples)
+    share = samples - whole
+    padded = np.concatenate([np.repeat(x[..., :1], whole + 1, axis=-1), x], axis=-1)
+    n = x.shape[-1]
+    return np.asarray((1.0 - share) * padded[..., 1 : 1 + n] + share * padded[..., :n])
+
+
+@njit(cache=False, nogil=True)
+def _table(i: Array, sector: NDArray[np.int64], sign: Array) -> Array:
+    """Mean of each phase's current in each sector, plain and times the sign of the current: (n, 2, 3, SECTORS)."""
+    n, _, n_times = i.shape
+    total = np.zeros((n, 2, 3, SECTORS))
+    for run in range(n):
+        for j in range(3):
+            count = np.zeros(SECTORS)
+            for t in range(n_times):
+                s = sector[run, j, t]
+                count[s] += 1.0
+                total[run, 0, j, s] += i[run, j, t]
+                total[run, 1, j, s] += i[run, j, t] * sign[run, t]
+            for s in range(SECTORS):
+                if count[s] > 0.0:
+                    total[run, 0, j, s] /= count[s]
+                    total[run, 1, j, s] /= count[s]
+    return total
+
+
+def motor_torque(plant: Actuator, signals: Signals) -> tuple[Array, Array]:
+    """Nominal torque Σ κ_j i_j (n, n_times), and electrical angles by phase (n, 3, n_times). [N m, rad]
+
+    The angle is taken as late as the anti-alias stages make the current.
+    """
+    lag = 2.0 / (2.0 * np.pi * plant.sensors.f_lag) * plant.control.rate
+    theta_e = plant.motor.p * delayed(signals.theta_m, lag)[:, None, :] - PHASE
+    return (plant.motor.k_e * _trap(theta_e) * signals.i).sum(axis=1), theta_e
+
+
+def features(plant: Actuator, signals: Signals) -> dict[str, Array]:
+    """The groups of the table above, each (n, n_features)."""
+    rate = plant.control.rate
+    T = 1.0 / rate
+    n_times = signals.theta_m.shape[1]
+    m = {name: spacing(seconds, rate, n_times) for name, (seconds, _, _) in GROUPS.items()}
+    tau, theta_e = motor_torque(plant, signals)
+    w_m = np.gradient(signals.theta_m, T, axis=-1)
+    i_q = 0.5 * (_six_step(theta_e) * signals.i).sum(axis=1)
+    c, limit = plant.control, plant.inverter.I_max
+    I_ref = np.clip(c.K_w * (c.K_p * (signals.theta_cmd - signals.theta_u) - w_m), -limit, limit)
+    lag = 2.0 / (2.0 * np.pi * plant.sensors.f_lag) * rate + 0.5
+    smooth = np.apply_along_axis(np.convolve, -1, i_q, np.ones(21) / 21.0, "same")
+    sector = np.floor((theta_e / (2.0 * np.pi)) % 1.0 * SECTORS).astype(np.int64) % SECTORS
+    sign = smooth / (np.abs(smooth) + I_SIGN)
+    skip = round(SETTLING * rate)
+    table = _table(signals.i[:, :, skip:], sector[:, :, skip:], sign[:, skip:])
+    gap = local_mean(signals.theta_m / plant.transmission.GR - signals.theta_u, m["gap"])
+    found = {
+        "torque": local_mean(tau, m["torque"])
+        - plant.motor.J_m * acceleration(signals.theta_m, m["torque"], T)
+        - plant.motor.C * local_mean(w_m, m["torque"]),
+        "control": local_mean(i_q - delayed(I_ref, lag), m["control"]),
+        "current": local_mean(i_q, m["current"]),
+        "tracking": local_mean(signals.theta_u - signals.theta_cmd, m["tracking"]),
+        "gap": gap - gap.mean(axis=-1, keepdims=True),
+        "sum": local_mean(signals.i.sum(axis=1), m["sum"]),
+    }
+    if signals.u_dc is not None:
+        found["supply"] = local_mean(signals.u_dc, m["supply"])
+    settled = {name: x[:, skip // m[name] :] for name, x in found.items()}
+    return {**settled, "phase": table.reshape(len(table), -1)}
+
+
+def stacked(groups: dict[str, Array]) -> Array:
+    """All groups side by side, (n, n_features)."""
+    return np.concatenate(list(groups.values()), axis=1)
+
+
+def slices(groups: dict[str, Array]) -> dict[str, slice]:
+    """Where each group stands in `stacked`."""
+    ends = np.cumsum([x.shape[1] for x in groups.values()])
+    return {name: slice(end - x.shape[1], end) for (name, x), end in zip(groups.items(), ends, strict=True)}
+
+
+def floors(groups: dict[str, Array]) -> Array:
+    """Smallest standard deviation of each feature, (n_features,)."""
+    return np.concatenate([np.full(x.shape[1], GROUPS[name][1]) for name, x in groups.items()])

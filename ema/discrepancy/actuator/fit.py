@@ -1,0 +1,177 @@
+"""Fit faults and parameters of effects to measured cycles: Gauss–Newton on simulated means."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from ema.core.names import FAULTS
+from ema.effects import registry
+
+from .features import Array
+from .noise import Noise
+from .plant import EmaPlant, Point
+
+N_SEEDS = 16  # for a column of the Jacobian, and for the base while searching
+SEED = 1_000_000
+K_STEP = 0.03  # below, the switching noise of a difference is as large as the difference
+LENGTH = 150.0  # of a step, in standard deviations of a cycle: four times the noise of one cycle's features
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter to be fitted: its bounds and the step of its finite difference."""
+
+    name: str
+    low: float
+    high: float
+    step: float
+
+
+K_FREE = tuple(Free(name, 0.0, 1.0, K_STEP) for name in FAULTS)
+
+
+def free(name: str, step: float | None = None) -> Free:
+    """A free parameter of an effect, by its registered bounds; the step from where a search begins."""
+    effect, parameter = name.split(".")
+    p = next(p for p in registry()[effect].parameters if p.name == parameter)
+    return Free(name, p.low, p.high, step if step is not None else (p.start - p.neutral) or 0.1 * (p.high - p.low))
+
+
+Columns = dict[tuple[int, str], Array]  # by motion and name of the parameter; not whitened, per unit
+
+
+def column_points(point: Point, f: Free) -> tuple[Point, float]:
+    """The point one step along a parameter (inside its bounds), and the step."""
+    x = point.get(f.name, 0.0)
+    step = f.step if f.low <= x + f.step <= f.high else -f.step
+    return {**point, f.name: x + step}, step
+
+
+def columns(plant: EmaPlant, frees: Sequence[Free], point: Point, motions: Sequence[int]) -> Columns:
+    """Finite-difference columns of the mean features at a point."""
+    if not frees:
+        return {}
+    moved = [column_points(point, f) for f in frees]
+    found: Columns = {}
+    for motion in motions:
+        means = plant.mean([point, *(p for p, _ in moved)], plant.first[motion], N_SEEDS, SEED)
+        for f, (_, step), mean in zip(frees, moved, means[1:], strict=True):
+            found[motion, f.name] = (mean - means[0]) / step
+    return found
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model on some cycles.
+
+    Attributes
+    ----------
+    point : Point
+    free : tuple of Free
+    columns : Columns
+        Jacobian of the last iteration.
+    residuals : dict of arrays
+        Whitened residual by cycle, of the cycles it was fitted on.
+    misfit : float
+        Sum of squares over what noise makes of it.
+    """
+
+    point: Point
+    free: tuple[Free, ...]
+    columns: Columns
+    residuals: dict[int, Array]
+    misfit: float
+    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+def residuals(
+    plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int], n_seeds: int = N_SEEDS, seed: int = SEED
+) -> dict[int, Array]:
+    """Whitened measured less mean simulated features, by cycle."""
+    return {c: noise.of(c).white(plant.data.y[c] - plant.mean([point], c, n_seeds, seed + 1000 * c)[0]) for c in cycles}
+
+
+def stacked_jacobian(noise: Noise, frees: Sequence[Free], cols: Columns, cycles: Sequence[int]) -> Array:
+    """Whitened Jacobian of all cycles below each other, (n_cycles * n_features, n_free)."""
+    data = noise.plant.data
+    by_motion = {
+        m: noise.motions[m].white(np.array([cols[m, f.name] for f in frees])).T
+        for m in sorted({int(data.motion[c]) for c in cycles})
+    }
+    return np.concatenate([by_motion[int(data.motion[c])] for c in cycles])
+
+
+def bounded(J: Array, r: Array, low: Array, high: Array) -> tuple[Array, float]:
+    """Least-squares solution within bounds, and the squared residual it promises."""
+    scale = np.linalg.norm(J, axis=0)
+    scale[scale == 0.0] = 1.0
+    margin = 1e-12 * (1.0 + high - low)
+    solved = lsq_linear(J / scale, r, ((low - margin) * scale, (high + margin) * scale), method="bvls")
+    return np.clip(solved.x / scale, low, high), 2.0 * float(solved.cost)
+
+
+def bounds(frees: Sequence[Free], point: Point) -> tuple[Array, Array]:
+    """How far each parameter may go down and up from a point."""
+    x = np.array([point.get(f.name, 0.0) for f in frees])
+    return np.array([f.low for f in frees]) - x, np.array([f.high for f in frees]) - x
+
+
+def moved(point: Point, frees: Sequence[Free], step: Array) -> Point:
+    """The point after a step."""
+    return {**point, **{f.name: point.get(f.name, 0.0) + float(d) for f, d in zip(frees, step, strict=True)}}
+
+
+def fit(
+    plant: EmaPlant,
+    noise: Noise,
+    frees: Sequence[Free],
+    start: Point,
+    cycles: Sequence[int],
+    *,
+    known: Columns | None = None,
+    n_iterations: int = 3,
+) -> Fit:
+    """Gauss–Newton from `start`; columns in `known` are used in the first iteration instead of new ones."""
+    motions = sorted({int(plant.data.motion[c]) for c in cycles})
+    point: Point = dict(start)
+    old: Point = point
+    res = residuals(plant, noise, point, cycles)
+    cost = sum(float(r @ r) for r in res.values())
+    cols: Columns = dict(known or {})
+    J = np.empty((0, 0))
+    steps: dict[str, float] = {}
+    for iteration in range(n_iterations):
+        stale = [f for f in frees if iteration > 0 or (motions[0], f.name) not in cols]
+        if iteration > 0 and max(abs(point.get(n, 0.0) - old.get(n, 0.0)) for n in FAULTS) < K_STEP:
+            stale = [f for f in stale if f.name not in FAULTS]  # faults hardly moved: their columns still hold
+        stale = [replace(f, step=steps.get(f.name, f.step)) for f in stale]
+        cols |= columns(plant, stale, point, motions)
+        J = stacked_jacobian(noise, frees, cols, cycles)
+        length = np.linalg.norm(J, axis=0) / np.sqrt(len(cycles))
+        steps = {
+            f.name: np.sign(f.step) * min(abs(f.step), LENGTH / max(x, 1e-300))
+            for f, x in zip(frees, length, strict=True)
+        }
+        r = np.concatenate([res[c] for c in cycles])
+        step, promised = bounded(J, r, *bounds(frees, point))
+        if cost - promised < 4.0 * len(frees) and iteration > 0:
+            break
+        old, improved = point, False
+        for share in (1.0, 0.5, 0.2):
+            candidate = moved(point, frees, share * step)
+            new = residuals(plant, noise, candidate, cycles)
+            new_cost = sum(float(x @ x) for x in new.values())
+            if new_cost < cost:
+                gained, improved = cost - new_cost, True
+                point, res, cost = candidate, new, new_cost
+                break
+        if not improved or gained < 0.001 * cost:
+            break
+    information = J.T @ J
+    covariance = np.linalg.pinv(information + 1e-12 * np.trace(information) / len(J.T) * np.eye(len(J.T)))
+    found = [res[c] for c in cycles]
+    return Fit(point, tuple(frees), cols, res, noise.misfit(found, cycles), covariance)

@@ -1,0 +1,157 @@
+"""How much two runs of the same actuator differ, and whether a residual is more than that."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.stats import gamma
+
+from .features import Array
+from .plant import EmaPlant, Point
+
+N_COVARIANCE = 128
+N_NULL = 64
+SEED = 7_000_000
+FALSE_ALARMS = 0.004  # of the whole verdict; the aim is 1 %, and the null distribution is itself estimated
+
+
+@dataclass(frozen=True)
+class MotionNoise:
+    """Noise of one motion at one point.
+
+    Attributes
+    ----------
+    sd : array, shape (n_features,)
+        With the floor of each feature.
+    L : array, shape (n_features, n_features)
+        Cholesky factor of the correlation.
+    envelope_sd : array
+        Of the envelope. [A]
+    fresh : array, shape (n_fresh, n_features)
+        Whitened deviations of runs that the covariance has not seen.
+    """
+
+    sd: Array
+    L: Array
+    envelope_sd: Array
+    fresh: Array
+
+    def white(self, x: Array) -> Array:
+        """Whitened rows of `x`, shape (..., n_features)."""
+        return whitened(self.L, x / self.sd)
+
+
+def whitened(L: Array, x: Array) -> Array:
+    """L⁻¹ times each row of `x`, shape (..., n_features)."""
+    return np.asarray(solve_triangular(L, np.atleast_2d(x).T, lower=True, check_finite=False).T.reshape(np.shape(x)))
+
+
+def shrinkage(z: Array) -> float:
+    """Weight of the diagonal in the estimate of a correlation matrix from standardised rows z (n, d).
+
+    λ = Σ Var(r_ij) / Σ r_ij²  over i ≠ j  (Schäfer and Strimmer, Stat. Appl. Genet. Mol. Biol. 4, 2005).
+    """
+    n = len(z)
+    r = z.T @ z / (n - 1)
+    second = (z**2).T @ (z**2) / (n - 1)
+    variance = (second - r**2) / n
+    off = ~np.eye(z.shape[1], dtype=bool)
+    return float(np.clip(variance[off].sum() / max((r[off] ** 2).sum(), 1e-300), 0.02, 1.0))
+
+
+def motion_noise(plant: EmaPlant, point: Point, motion: int) -> MotionNoise:
+    """Simulate the cycles of a motion many times and describe how runs of one cycle differ."""
+    cycles = np.flatnonzero(plant.data.motion == motion)
+    each = -(-(N_COVARIANCE + N_NULL) // len(cycles))
+    of = np.repeat(cycles, each)
+    n = len(of)
+    runs = plant.simulate([point] * n, of.tolist(), range(SEED, SEED + n))
+    floor = plant.floors[motion] * np.random.default_rng(SEED).standard_normal((n, len(plant.floors[motion])))
+
+    def deviations(x: Array) -> Array:
+        """From the mean of the runs of the same cycle, as large as from a mean over many."""
+        by_cycle = x.reshape(len(cycles), each, -1)
+        away = (by_cycle - by_cycle.mean(axis=1, keepdims=True)) * np.sqrt(each / (each - 1.0))
+        return away.transpose(1, 0, 2).reshape(n, -1)
+
+    x, new = np.split(deviations(runs.features + floor), [n * N_COVARIANCE // (N_COVARIANCE + N_NULL)])
+    sd = np.sqrt((x**2).mean(axis=0))
+    z = x / sd
+    correlation = (1.0 - shrinkage(z)) * (z.T @ z / len(z))
+    np.fill_diagonal(correlation, 1.0)
+    L = cholesky(correlation, lower=True, check_finite=False)
+    return MotionNoise(sd, L, deviations(runs.envelopes).std(axis=0), whitened(L, new / sd))
+
+
+class Noise:
+    """Noise of every motion near one point."""
+
+    def __init__(self, plant: EmaPlant, point: Point):
+        self.plant, self.point = plant, dict(point)
+        self.motions = [motion_noise(plant, point, m) for m in range(plant.n_motions)]
+
+    def of(self, cycle: int) -> MotionNoise:
+        """Noise of the motion a cycle belongs to."""
+        return self.motions[int(self.plant.data.motion[cycle])]
+
+    def misfit(self, residuals: Sequence[Array], cycles: Sequence[int]) -> float:
+        """Sum of squared whitened residuals over what noise makes of it; about one if the model is right."""
+        total = sum(float(r @ r) for r in residuals)
+        expected = sum(float((self.of(c).fresh ** 2).sum(axis=1).mean()) for c in cycles)
+        return total / expected
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether residuals are noise: the corrected p-value, and z-score by feature group."""
+
+    p_value: float
+    scores: dict[str, float]
+
+    @property
+    def is_noise(self) -> bool:
+        """True where the residual is compatible with noise."""
+        return self.p_value >= FALSE_ALARMS
+
+    @property
+    def loudest(self) -> str:
+        """The group that speaks most clearly."""
+        return max(self.scores, key=lambda name: self.scores[name])
+
+
+def verdict(
+    noise: Noise, residuals: Sequence[Array], cycles: Sequence[int], columns: Sequence[Array], extra: float
+) -> Verdict:
+    """Test whitened residuals of cycles, group by group, against runs of the fitted simulation itself.
+
+    Each statistic is a sum of squares of the whitened residual less what the fitted columns can take up; its null
+    distribution is a gamma with mean and variance from runs that neither mean nor covariance have seen.
+
+    Parameters
+    ----------
+    columns : sequence of arrays, shape (n_features, n_free)
+        Whitened Jacobian of each motion.
+    extra : float
+        Variance of the predicted mean over that of one run (1 / number of seeds).
+    """
+    slices = [noise.plant.slices[int(noise.plant.data.motion[c])] for c in cycles]
+    names = list(slices[0])
+    bases = [np.linalg.qr(A)[0] if A.shape[1] else A for A in columns]
+    scores, p = {}, {}
+    for name in (*names, "all"):
+        statistic, mean, variance = 0.0, 0.0, 0.0
+        for cycle, r, where in zip(cycles, residuals, slices, strict=True):
+            motion = int(noise.plant.data.motion[cycle])
+            Q, at = bases[motion], where.get(name, slice(None))
+            fresh = noise.motions[motion].fresh
+            null = ((fresh - fresh @ Q @ Q.T)[:, at] ** 2).sum(axis=1) * (1.0 + extra)
+            statistic += float((r - Q @ (Q.T @ r))[at] @ (r - Q @ (Q.T @ r))[at])
+            mean += float(null.mean())
+            variance += float(null.var(ddof=1)) + float(null.var(ddof=1)) / len(null)
+        scale = variance / mean
+        p[name] = float(gamma.sf(statistic, mean / scale, scale=scale))
+        scores[name] = (statistic - mean) / np.sqrt(variance)
+    return Verdict(min(1.0, min(p.values()) * len(p)), scores)

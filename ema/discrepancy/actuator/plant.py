@@ -1,0 +1,125 @@
+"""The three-phase actuator with its measured cycles: simulate them at any point of parameters.
+
+A *point* names faults (``"k1"``) and parameters of effects (``"cogging.amplitude"``); what it does not name is zero or
+neutral. What a simulation gives is random (switching, sensor noise), so predictions are means over seeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema.core.names import FAULTS
+from ema.effects import registry
+from ema.models import hf
+from ema.models.actuator import Actuator
+
+from .cycles import Measured
+from .features import Array, Signals, features, floors, slices, stacked
+
+Point = Mapping[str, float]
+CHUNK = 64  # runs in memory at a time
+ENVELOPE_STEP = 10  # the envelope is low-passed at 200 Hz: every tenth sample says all
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Simulated runs of one motion: features (n, n_features) and envelopes (n, n_times / ENVELOPE_STEP)."""
+
+    features: Array
+    envelopes: Array
+
+
+class EmaPlant:
+    """Simulates the measured cycles of an actuator.
+
+    Parameters
+    ----------
+    plant : Actuator
+    data : Measured
+    n_threads : int
+    """
+
+    def __init__(self, plant: Actuator, data: Measured, n_threads: int = 2):
+        self.plant, self.data, self.n_threads = plant, data, n_threads
+        self.n_runs = 0
+        self.n_motions = len(data.commands)
+        self.first = [int(np.flatnonzero(data.motion == m)[0]) for m in range(self.n_motions)]
+        groups = [features(plant, data.signals[c]) for c in self.first]
+        self.slices = [slices(g) for g in groups]
+        self.floors = [floors(g) for g in groups]
+
+    def neutral(self, name: str) -> float:
+        """Value of a parameter that a point does not name: the plant file's own, or neutral."""
+        if name in FAULTS:
+            return 0.0
+        effect, parameter = name.split(".")
+        declared = self.plant.effects.get(effect, {})
+        return float(declared.get(parameter, registry()[effect].neutral()[parameter]))
+
+    def simulate(self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int]) -> Runs:
+        """One run for each (point, cycle, seed), given as three sequences of one length; cycles of one motion."""
+        d, n = self.data, len(points)
+        command = d.commands[d.motion[cycles[0]]]
+        k = np.array([[point.get(name, 0.0) for name in FAULTS] for point in points])
+        effects = self._effects(points)
+        cycles_ = np.asarray(cycles)
+        unseen = self.plant.sensors.lvdt_step * np.array([np.random.default_rng(s).random() - 0.5 for s in seeds])
+        start = hf.start_at(
+            self.plant, d.start[cycles_, 0] + unseen, d.start[cycles_, 1] - self._angle_error(points, cycles_)
+        )
+        all_features, all_envelopes = [], []
+        for first in range(0, n, CHUNK):
+            part = slice(first, min(first + CHUNK, n))
+            r = hf.simulate(
+                self.plant,
+                k[part],
+                command,
+                seeds=np.asarray(seeds)[part],
+                start=start[part],
+                effects={e: {p: x[part] for p, x in values.items()} for e, values in effects.items()},
+                dT=d.dT[cycles_[part]],
+                n_threads=self.n_threads,
+            )
+            theta_m = r.theta_m
+            if d.angle_step:
+                theta_m = d.angle_step * np.round(theta_m / d.angle_step)
+            u_dc = r.u_dc if d.signals[cycles[0]].u_dc is not None else None
+            signals = Signals(r.i, theta_m, r.theta_u, np.broadcast_to(command, theta_m.shape), u_dc)
+            all_features.append(stacked(features(self.plant, signals)))
+            all_envelopes.append(r.envelope[:, ::ENVELOPE_STEP])
+        self.n_runs += n
+        return Runs(np.concatenate(all_features), np.concatenate(all_envelopes))
+
+    def mean(self, points: Sequence[Point], cycle: int, n_seeds: int, seed: int) -> Array:
+        """Mean features of a cycle at several points, (n_points, n_features). All points share their seeds."""
+        grid = [point for point in points for _ in range(n_seeds)]
+        seeds = [seed + j for _ in points for j in range(n_seeds)]
+        runs = self.simulate(grid, [cycle] * len(grid), seeds)
+        return runs.features.reshape(len(points), n_seeds, -1).mean(axis=1)
+
+    def _effects(self, points: Sequence[Point]) -> dict[str, dict[str, Array]]:
+        names = sorted({name for point in points for name in point if "." in name})
+        effects: dict[str, dict[str, Array]] = {}
+        for name in names:
+            effect, parameter = name.split(".")
+            values = np.array([point.get(name, self.neutral(name)) for point in points])
+            effects.setdefault(effect, {})[parameter] = values
+        for effect, given in effects.items():  # `simulate` replaces a declared effect as a whole
+            for parameter, value in self.plant.effects.get(effect, {}).items():
+                given.setdefault(parameter, np.full(len(points), value))
+        return effects
+
+    def _angle_error(self, points: Sequence[Point], cycles: np.ndarray) -> Array:
+        """What the resolver shows too much at the start of each run. [rad]"""
+        angle = np.array([p.get("commutation_offset.angle", self.neutral("commutation_offset.angle")) for p in points])
+        error = angle / self.plant.motor.p
+        law = registry()["resolver_error"]
+        names = [f"resolver_error.{p.name}" for p in law.parameters]
+        if any(name in point for point in points for name in names) or "resolver_error" in self.plant.effects:
+            for run, (point, cycle) in enumerate(zip(points, cycles, strict=True)):
+                values = [point.get(name, self.neutral(name)) for name in names]
+                error[run] += law.laws["angle_error"](float(self.data.start[cycle, 1]), *values)
+        return np.asarray(error)

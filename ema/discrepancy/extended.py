@@ -1,0 +1,35 @@
+"""The plant file with what was found in it; every command takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ema.core import config
+
+from .findings import FoundEffect
+
+
+def write_extended(plant_file: Path, effects: Iterable[FoundEffect], out: Path) -> None:
+    """Write `plant_file` with the effects' values; their intervals stand in comments at the top."""
+    data: dict[str, Any] = config.read_yaml(plant_file)
+    declared: dict[str, dict[str, float]] = dict(data.get("effects") or {})
+    comments = [f"# {plant_file.name} with what `ema discrepancy` found in measured records."]
+    for effect in effects:
+        declared[effect.name] = {
+            **declared.get(effect.name, {}),
+            **{name: float(f"{q.value:.6g}") for name, q in effect.parameters.items()},
+        }
+        comments.append(f"# {effect.sentence}")
+        comments += [
+            f"#   {effect.name}.{name}: {q.low:.4g} … {q.high:.4g} [{q.unit}] (95 %)"
+            for name, q in effect.parameters.items()
+        ]
+        if effect.indistinguishable_from:
+            comments.append(f"#   or {', '.join(effect.indistinguishable_from)}; told apart by {effect.separated_by}")
+    data["effects"] = declared
+    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+    out.write_text("\n".join(comments) + "\n" + text, encoding="utf-8")

@@ -1,0 +1,110 @@
+"""What `ema discrepancy` says: one form for every plant, written as findings.json."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A value with its interval of 95 %."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """A cause with what the data cannot tell from it, and the experiment that could."""
+
+    name: str
+    confidence: float
+    indistinguishable_from: tuple[str, ...]
+    parameters: dict[str, Quantity]
+    sentence: str
+    separated_by: str
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Errors of the simulated envelope [A] and faults before and after the effects were added."""
+
+    train_before: float
+    train_after: float
+    heldout_before: float
+    heldout_after: float
+    noise_floor: float
+    k_before: tuple[float, ...] = ()
+    k_after: tuple[float, ...] = ()
+    false_alarms_before: int = 0
+    false_alarms_after: int = 0
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The answer.
+
+    Attributes
+    ----------
+    notes : list of str
+        What a reader must know to judge the answer: what was not measured, what was close.
+    """
+
+    verdict: Literal["adequate", "explained", "unexplained"]
+    effects: list[FoundEffect]
+    gain: Gain
+    structure: dict[str, Any] = field(default_factory=dict)
+    tried: list[dict[str, Any]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The content of findings.json."""
+        g = self.gain
+        return {
+            "verdict": self.verdict,
+            "effects": [asdict(effect) for effect in self.effects],
+            "structure": self.structure,
+            "gain": {
+                "train": {"err_before": g.train_before, "err_after": g.train_after},
+                "heldout": {
+                    "err_before": g.heldout_before,
+                    "err_after": g.heldout_after,
+                    "noise_floor": g.noise_floor,
+                },
+                "k_before": list(g.k_before),
+                "k_after": list(g.k_after),
+                "false_alarms_before": g.false_alarms_before,
+                "false_alarms_after": g.false_alarms_after,
+            },
+            "tried": self.tried,
+            "notes": self.notes,
+        }
+
+    def write(self, path: Path) -> None:
+        """Write findings.json."""
+        path.write_text(json.dumps(self.as_dict(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+    def sentences(self) -> list[str]:
+        """What an engineer would say."""
+        if self.verdict == "adequate":
+            return ["The simulation agrees with the measurement: what is left is switching noise."]
+        said = [
+            effect.sentence[0].upper() + effect.sentence[1:]
+            + (f" (or {' or '.join(effect.indistinguishable_from)}; told apart by {effect.separated_by})"
+               if effect.indistinguishable_from else "") + "."
+            for effect in self.effects
+        ]  # fmt: skip
+        if self.verdict == "unexplained":
+            said.append("No effect of the library explains the rest; its structure: " + describe(self.structure) + ".")
+        return said
+
+
+def describe(structure: dict[str, Any]) -> str:
+    """The structure of an unexplained residual in words."""
+    parts = [str(text) for text in structure.get("sentences", [])]
+    return "; ".join(parts) if parts else "none that stands out"

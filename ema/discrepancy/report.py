@@ -1,0 +1,58 @@
+"""report.html: one file that opens without a network."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import jinja2
+
+from .findings import Findings
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure as PNG with what it shows."""
+
+    title: str
+    caption: str
+    png: bytes
+
+    @property
+    def uri(self) -> str:
+        """For an <img>."""
+        return "data:image/png;base64," + base64.b64encode(self.png).decode()
+
+
+def picture(title: str, caption: str, figure: Figure) -> Picture:
+    """Render a figure."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=110, bbox_inches="tight")
+    return Picture(title, caption, stream.getvalue())
+
+
+def write_report(
+    path: Path, plant_name: str, records: Sequence[str], findings: Findings, pictures: Sequence[Picture]
+) -> None:
+    """Write the report."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("ema.discrepancy", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    html = environment.get_template("report.html.j2").render(
+        plant=plant_name,
+        records=records,
+        f=findings,
+        g=findings.gain,
+        sentences=findings.sentences(),
+        pictures=pictures,
+        software=version("ema-monitor"),
+    )
+    path.write_text(html, encoding="utf-8")

@@ -1,0 +1,320 @@
+"""A second, independent simulation of the three-phase actuator, written from its description, with flaws to hide.
+
+Shares no code with `ema`: the finder is tested on data it did not make. Equations: wye-connected motor with floating
+neutral and trapezoidal coefficients, hysteresis current control at 1 µs, four-state dry friction, backlash, cascade
+control at 10 kHz, two 2 kHz anti-alias stages, 12-bit current ADC. Where physics allows, flaws have another functional
+form than the library's effects (see `Flaws`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+SUBSTEPS = 100
+DT = 1e-6
+
+
+class Flaws(NamedTuple):
+    """What this actuator does that the finder's nominal plant does not; zero is no flaw."""
+
+    # faults
+    k1: float = 0.0
+    k2: float = 0.0
+    k3: float = 0.0
+    k4: float = 0.0
+    k5: float = 0.0
+    k6: float = 0.0
+    # motor and inverter
+    flux: float = 0.0  # relative change
+    resistance: float = 0.0  # relative change
+    dead_time: float = 0.0  # [s]
+    source_resistance: float = 0.0  # [ohm], DC link of 2 mF instead of a first-order lag
+    saturation_current: float = 0.0  # [A] κ and L fall as tanh(i/i_s)/(i/i_s); 0: never
+    commutation: float = 0.0  # [rad electrical]
+    # mechanics
+    viscous: float = 0.0  # [N m s/rad]
+    quadratic: float = 0.0  # [N m s²/rad²]
+    stribeck: float = 0.0  # Tustin's law with a Gaussian: F_d (1 + s exp(-(ω/ω_s)²))
+    stribeck_speed: float = 20.0
+    asymmetry: float = 0.0
+    bump: float = 0.0  # friction higher by a raised cosine over ±bump_width around bump_centre [rad at the user]
+    bump_centre: float = 0.0
+    bump_width: float = 2e-3
+    load_friction: float = 0.0  # [1/(N m)]
+    cogging: float = 0.0  # [N m] first line; the second has a fifth of it at twice the order
+    cogging_order: float = 12.0
+    cogging_phase: float = 0.0
+    load: float = 0.0  # [N m at the user]
+    spring: float = 0.0  # [N m/rad at the user]
+    compliance: float = 0.0  # [rad/(N m)] with the user's own inertia and a viscous damper
+    user_inertia: float = 0.6
+    user_damping: float = 0.0  # [N m s/rad]
+    # sensors
+    gain_a: float = 0.0
+    gain_b: float = 0.0
+    gain_c: float = 0.0
+    offset_a: float = 0.0
+    offset_b: float = 0.0
+    offset_c: float = 0.0
+    once_cosine: float = 0.0
+    once_sine: float = 0.0
+    twice_cosine: float = 0.0
+    twice_sine: float = 0.0
+    position_delay: float = 0.0  # [s]
+    speed_delay: float = 0.0  # [s]
+    clock_skew: float = 0.0  # the recorder's interval is longer by this share
+    adc_limit: float = 30.0  # [A]
+    # outside the library
+    line: float = 0.0  # [N m] torque line at a non-integer order
+    line_order: float = 7.37
+    drag: float = 0.0  # [N m] additional dry friction that comes and goes with time
+    drag_period: float = 0.11  # [s]
+    deadband: float = 0.0  # [rad] the controller ignores smaller position errors
+    slew: float = 0.0  # [A/s] limit on the reference current
+    hum: float = 0.0  # [A] on phase A's measurement
+    hum_frequency: float = 187.0  # [Hz]
+    shaker: float = 0.0  # [N m] torque at a fixed frequency
+    shaker_frequency: float = 83.0  # [Hz]
+    weak_leg: float = 0.0  # share of switching commands to "up" that leg B ignores
+
+
+class State(NamedTuple):
+    """At rest or in motion, at the end of a cycle."""
+
+    i: np.ndarray
+    filtered: np.ndarray  # (2, 3)
+    switch: np.ndarray
+    mechanics: np.ndarray  # theta_m, w_m, theta_u, w_u
+    u_dc: np.ndarray
+
+
+def rest() -> State:
+    return State(np.zeros(3), np.zeros((2, 3)), np.ones(3), np.zeros(4), np.array([48.0]))
+
+
+@numba.njit
+def _trapezoid(angle):
+    x = (angle / (2.0 * math.pi)) % 1.0  # 0…1, as the sine
+    if x < 0.25:
+        y = 12.0 * x
+    elif x < 0.75:
+        y = 6.0 - 12.0 * x
+    else:
+        y = 12.0 * x - 12.0
+    return min(max(y, -1.0), 1.0)
+
+
+@numba.njit
+def _commutated(angle):
+    x = (angle / (2.0 * math.pi)) % 1.0
+    if 1.0 / 12.0 <= x <= 5.0 / 12.0:
+        return 1.0
+    if 7.0 / 12.0 <= x <= 11.0 / 12.0:
+        return -1.0
+    return 0.0
+
+
+@numba.njit
+def _loss(x):
+    """tanh(x)/x"""
+    return 1.0 if abs(x) < 1e-4 else math.tanh(x) / x
+
+
+@numba.njit
+def _run(f, command, lvdt_noise, t0, rng_switch, i, flt, sw, mech, link, out):
+    R, L, k_e, p, J, C = 1.065, 0.36e-3, 0.0376, 2.0, 2.5e-5, 3e-5
+    V, h, I_max, GR, K_p, K_w = 48.0, 0.25, 22.5, 500.0, 6e4, 0.05
+    F_s, F_d = 0.04 * (1.0 + 3.0 * f.k1), 0.02 * (1.0 + 3.0 * f.k1)
+    b, stop, lsb = 1e-5 * (1.0 + 100.0 * f.k2), 0.4, 1.5e-5
+    N = np.array([1.0 - f.k3, 1.0 - f.k4, 1.0 - f.k5])
+    gains = np.array([1.0 + f.gain_a, 1.0 + f.gain_b, 1.0 + f.gain_c])
+    offsets = np.array([f.offset_a, f.offset_b, f.offset_c])
+    shift = np.array([0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0])
+    blank = np.zeros(3)
+    kappa, v, x, di, Lj, Rj = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    n = len(command)
+    log_u, log_w = np.zeros(n), np.zeros(n)
+    T = DT * SUBSTEPS * (1.0 + f.clock_skew)
+    dt = T / SUBSTEPS
+    I_ref, last_error = 0.0, 0.0
+    draw = 0
+    for tick in range(n):
+        theta, w, theta_u, w_u = mech[0], mech[1], mech[2], mech[3]
+        error = (
+            f.once_cosine * math.cos(theta)
+            + f.once_sine * math.sin(theta)
+            + f.twice_cosine * math.cos(2.0 * theta)
+            + f.twice_sine * math.sin(2.0 * theta)
+            + f.commutation / p
+        )
+        seen_w = w + ((error - last_error) / T if tick > 0 else 0.0)
+        last_error = error
+        log_u[tick] = lsb * math.floor((theta_u + lvdt_noise[tick]) / lsb + 0.5)
+        log_w[tick] = seen_w
+        late_u, late_w = tick - f.position_delay / T, tick - f.speed_delay / T
+        lower = max(math.floor(late_u), 0)
+        upper = min(lower + 1, tick)
+        seen_u = log_u[lower] + (max(late_u, 0.0) - lower) * (log_u[upper] - log_u[lower])
+        lower = max(math.floor(late_w), 0)
+        upper = min(lower + 1, tick)
+        seen_w = log_w[lower] + (max(late_w, 0.0) - lower) * (log_w[upper] - log_w[lower])
+        lag = command[tick] - seen_u
+        if f.deadband > 0.0:
+            lag = 0.0 if abs(lag) < f.deadband else lag - math.copysign(f.deadband, lag)
+        wanted = min(max(K_w * (K_p * lag - seen_w), -I_max), I_max)
+        if f.slew > 0.0:
+            wanted = min(max(wanted, I_ref - f.slew * T), I_ref + f.slew * T)
+        I_ref = wanted
+        for j in range(3):
+            out[j, tick] = flt[1, j]
+        out[3, tick], out[4, tick], out[5, tick] = theta + error, seen_u, link[0]
+        if tick == n - 1:
+            break
+        for sub in range(SUBSTEPS):
+            theta, w, theta_u, w_u = mech[0], mech[1], mech[2], mech[3]
+            now = t0 + tick * T + sub * dt
+            # the motor
+            seen = (
+                p
+                * (
+                    theta
+                    + f.once_cosine * math.cos(theta)
+                    + f.once_sine * math.sin(theta)
+                    + f.twice_cosine * math.cos(2.0 * theta)
+                    + f.twice_sine * math.sin(2.0 * theta)
+                )
+                + f.commutation
+            )
+            for j in range(3):
+                kappa[j] = k_e * (1.0 + f.flux) * N[j] * (1.0 + f.k6 * math.cos(theta - shift[j]))
+                kappa[j] *= _trapezoid(p * theta - shift[j])
+                Lj[j], Rj[j] = L * N[j] * N[j], R * N[j] * (1.0 + f.resistance)
+                if f.saturation_current > 0.0:
+                    loss = _loss(i[j] / f.saturation_current)
+                    kappa[j] *= loss
+                    Lj[j] *= loss
+                x[j] = gains[j] * i[j] + offsets[j]
+                if j == 0 and f.hum != 0.0:
+                    x[j] += f.hum * math.sin(2.0 * math.pi * f.hum_frequency * now)
+                wish = I_ref * _commutated(seen - shift[j]) - x[j]
+                previous = sw[j]
+                if wish > h:
+                    sw[j] = 1.0
+                elif wish < -h:
+                    sw[j] = -1.0
+                if j == 1 and f.weak_leg > 0.0 and sw[j] > previous:
+                    draw = (draw + 1) % len(rng_switch)
+                    if rng_switch[draw] < f.weak_leg:
+                        sw[j] = -1.0
+                if sw[j] != previous:
+                    blank[j] = f.dead_time
+                dead = min(blank[j], dt) / dt
+                blank[j] = max(blank[j] - dt, 0.0)
+                diode = -1.0 if i[j] > 0.0 else 1.0
+                v[j] = 0.5 * link[0] * ((1.0 - dead) * sw[j] + dead * diode)
+            e0 = v[0] - Rj[0] * i[0] - kappa[0] * w
+            e1 = v[1] - Rj[1] * i[1] - kappa[1] * w
+            e2 = v[2] - Rj[2] * i[2] - kappa[2] * w
+            neutral = (e0 / Lj[0] + e1 / Lj[1] + e2 / Lj[2]) / (1.0 / Lj[0] + 1.0 / Lj[1] + 1.0 / Lj[2])
+            i_dc = 0.5 * (sw[0] * i[0] + sw[1] * i[1] + sw[2] * i[2])
+            if f.source_resistance > 0.0:
+                link[0] += dt / 2e-3 * ((V - link[0]) / f.source_resistance - i_dc)
+            di[0], di[1], di[2] = (e0 - neutral) / Lj[0], (e1 - neutral) / Lj[1], (e2 - neutral) / Lj[2]
+            torque = 0.0
+            for j in range(3):
+                i[j] += dt * di[j]
+                torque += kappa[j] * i[j]
+                flt[0, j] += 2.0 * math.pi * 2000.0 * dt * (x[j] - flt[0, j])
+                flt[1, j] += 2.0 * math.pi * 2000.0 * dt * (flt[0, j] - flt[1, j])
+            # the mechanics
+            drive = torque - C * w - f.viscous * w - f.quadratic * abs(w) * w
+            drive -= f.cogging * math.sin(f.cogging_order * theta + f.cogging_phase)
+            drive -= 0.2 * f.cogging * math.sin(2.0 * f.cogging_order * theta)
+            drive -= f.line * math.sin(f.line_order * theta)
+            drive -= f.shaker * math.sin(2.0 * math.pi * f.shaker_frequency * now)
+            gear_torque = f.load + f.spring * theta_u
+            twist = 0.0
+            if f.compliance > 0.0:
+                gap = theta / GR - theta_u
+                twist = gap - min(max(gap, -b), b)
+                gear_torque = twist / f.compliance
+                if twist != 0.0:
+                    gear_torque += f.user_damping * (w / GR - w_u)
+            drive -= gear_torque / GR
+            way = w if w != 0.0 else drive
+            direction = 1.0 if way > 0.0 else -1.0
+            factor = 1.0 + f.asymmetry * direction
+            factor *= 1.0 + f.load_friction * abs(torque)
+            if f.bump != 0.0 and abs(theta_u - f.bump_centre) < f.bump_width:
+                factor *= 1.0 + 0.5 * f.bump * (1.0 + math.cos(math.pi * (theta_u - f.bump_centre) / f.bump_width))
+            extra = f.drag if f.drag > 0.0 and (now / f.drag_period) % 1.0 < 0.35 else 0.0
+            if w == 0.0:
+                hold = F_s * factor + extra
+                net = 0.0 if abs(drive) <= hold else drive - math.copysign(hold, drive)
+            else:
+                slide = F_d * factor * (1.0 + f.stribeck * math.exp(-((w / f.stribeck_speed) ** 2))) + extra
+                net = drive - math.copysign(slide, w)
+            faster = w + dt / J * net
+            if faster * w < 0.0:
+                faster = 0.0
+            theta += dt * faster
+            end = GR * (stop + b)
+            if abs(theta) > end:
+                theta, faster = math.copysign(end, theta), 0.0
+            mech[0], mech[1] = theta, faster
+            if f.compliance > 0.0:
+                w_u += dt / f.user_inertia * (gear_torque - f.load - f.spring * theta_u)
+                theta_u += dt * w_u
+            else:
+                theta_u = min(max(theta_u, theta / GR - b), theta / GR + b)
+                w_u = faster / GR
+            mech[2], mech[3] = theta_u, w_u
+
+
+def cycle(flaws: Flaws, command: np.ndarray, state: State, seed: int) -> dict[str, np.ndarray]:
+    """One recorded cycle at 10 kHz; `state` is advanced. Channels by name."""
+    rng = np.random.default_rng(seed)
+    n = len(command)
+    out = np.zeros((6, n))
+    flaws = Flaws(*(float(x) for x in flaws))
+    _run(
+        *(flaws, np.ascontiguousarray(command, dtype=float), 4e-6 * rng.standard_normal(n), 10.0 * rng.random()),
+        *(rng.random(4096), state.i, state.filtered, state.switch, state.mechanics, state.u_dc, out),
+    )
+    i = np.clip(out[:3] + 5e-3 * rng.standard_normal((3, n)), -flaws.adc_limit, flaws.adc_limit)
+    step = 60.0 / 4096
+    i = step * np.round(i / step)
+    names = ("i_a", "i_b", "i_c")
+    return {
+        "t": np.arange(n) * 1e-4,
+        **dict(zip(names, i, strict=True)),
+        "theta_m": out[3],
+        "theta_u": out[4],
+        "theta_cmd": np.array(command),
+        "u_dc": out[5],
+    }
+
+
+def chirp(amplitude: float = 5e-3, f_end: float = 15.0, duration: float = 0.5) -> np.ndarray:
+    t = np.arange(round(duration * 1e4) + 1) / 1e4
+    return amplitude * np.sin(np.pi * f_end * t**2 / duration)
+
+
+MOTIONS = (chirp(), chirp(0.02, 3.0))  # fast and short; slow over three rotor turns
+
+
+def cycles(
+    flaws: Flaws, n: int = 6, seed: int = 0, motions: tuple[np.ndarray, ...] = MOTIONS
+) -> list[dict[str, np.ndarray]]:
+    """`n` consecutive cycles, motions in turn; between cycles the actuator is led back and comes to rest."""
+    found, state = [], rest()
+    for number in range(n):
+        command = motions[number % len(motions)]
+        found.append(cycle(flaws, command, state, 1000 * seed + number))
+        back = found[-1]["theta_cmd"][-1] * np.linspace(1.0, 0.0, 2000) ** 2
+        _ = cycle(flaws, np.concatenate([back, np.zeros(500)]), state, 1000 * seed + 500 + number)
+    return found
