@@ -163,9 +163,9 @@ def _n_listeners():
     return Path("/proc/net/can/rcvlist_all").read_text().count(" raw")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def daemon_on_vcan0(vcan0, coarse_bundle):
-    """Starts `ema daemon` processes on vcan0: `daemon_on_vcan0(folder)`; ended with the session at the latest."""
+    """Starts `ema daemon` processes on vcan0: `daemon_on_vcan0(folder)`; they end with the test file at the latest."""
     started = []
 
     def start(folder, numbers=(0,), **log_settings):

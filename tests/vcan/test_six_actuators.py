@@ -30,5 +30,6 @@ def test_six_actuators_without_a_lost_frame(daemon, vcan0, fly, capsys):
     assert beat["n_estimates"] == beat["n_cycles"]
     lost = ("n_lost", "n_repeated", "n_reordered", "n_crc_error", "n_wrong_counter", "n_wrong_length", "kernel_drops")
     assert {name: int(beat[name]) for name in lost} == dict.fromkeys(lost, 0)
+    assert daemon.stop() == 0
     with capsys.disabled():
         print(f"\nsix actuators: {n_frames} frames in {took:.1f} s ({n_frames / took:.0f}/s), daemon {cpu:.2f} s CPU")
