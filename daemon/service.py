@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Iterable, Mapping
 
@@ -56,6 +57,8 @@ class Service:
         """Run until stopped; then finish what is begun."""
         started = next_beat = time.monotonic()
         self._event(Level.INFO, "started", self._port.choice)
+        gc.collect()
+        gc.freeze()  # the garbage collector need not look through all that start-up has made, in the middle of a cycle
         notify("READY=1")
         while not self._stopping:
             frames = self._port.read(min(_WAIT, max(0.0, next_beat - time.monotonic())))
@@ -76,14 +79,19 @@ class Service:
             self._drops = self._port.counters.kernel_drops
             frames = np.concatenate([overflow_notice(int(frames["t_ns"][0])), frames])
         self._log.frames(frames, self._port.name)
-        self._put(self._monitor.update(frames))
+        self._put(self._monitor.stream(frames))
 
     def _put(self, outputs: Iterable[Output]) -> None:
+        """Every estimate onto the bus as soon as it is there; when all are, the rest of the work."""
+        later = []
         for out in outputs:
             if isinstance(out, Identified):
                 self._bus_sink.estimate(out)
                 if out.estimate.method == FIRST:
                     self._health.latency_ns = max(self._health.latency_ns, time.time_ns() - out.t_ns)
+            later.append(out)
+        for out in later:
+            if isinstance(out, Identified):
                 self._log_sink.estimate(out)
             elif isinstance(out, SampledEnvelope):
                 self._log_sink.envelope(out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import time
 from importlib.metadata import entry_points
@@ -14,7 +15,7 @@ from rich.console import Console
 from ema import bundle as bundles
 from ema.bus.interface import open_bus, parse
 from ema.core import config, resources
-from ema.core.errors import BundleError, EmaError
+from ema.core.errors import BundleError, EmaError, NegativeAnswer
 from ema.models.actuator import Actuator
 
 from . import stage
@@ -86,6 +87,23 @@ def fly(files: stage.Files, bus: str, console: Console) -> None:
             stage.finished(service, "daemon", files.said)
         finally:
             _end(service)
+
+
+def replay(files: stage.Files) -> int:
+    """`ema replay --identify`: how many estimates of the log come out again bit for bit, if all of them do.
+
+    Raises
+    ------
+    NegativeAnswer
+        One does not.
+    """
+    replayed = stage.run("replay", files.log, "--identify", "--json", output=files.replayed)
+    if replayed.wait() > 1:
+        stage.finished(replayed, "replay", files.replayed)
+    answer = json.loads(files.replayed.read_text(encoding="utf-8").partition("\nema: ")[0])
+    if answer["n_different"] or not answer["same_bundle"]:
+        raise NegativeAnswer(f"{answer['n_different']} replayed estimates differ from the log's, see {files.replayed}")
+    return int(answer["n_equal"])
 
 
 def make_report(files: stage.Files, console: Console) -> None:

@@ -37,7 +37,7 @@ def demo(out: Path, bus: str, n_cycles: int | None) -> None:
     chain.write_configuration(files, name, n_cycles)
     chain.fly(files, name, console)
     flight = results.read(files)
-    n_same = results.replayed(files, flight)
+    n_same = chain.replay(files)
     results.write_table(files, flight)
     plot.write(files.plot, flight)
     chain.make_report(files, console)

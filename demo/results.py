@@ -1,4 +1,4 @@
-"""What came of it: true against estimated faults, as numbers, table and picture; the log replayed."""
+"""What came of it: true against estimated faults, as numbers and as a table."""
 
 from __future__ import annotations
 
@@ -6,16 +6,11 @@ import csv
 from dataclasses import dataclass
 
 import numpy as np
-import yaml
 from rich.table import Table
 
-from ema import bundle as bundles
-from ema.bus import codec
-from ema.core import config
 from ema.core.errors import LogError, NegativeAnswer
 from ema.core.names import FAULTS
 from ema.log import LogReader
-from ema.monitor import Identified, Monitor, MonitorSettings, Runner, answers
 
 from .stage import Files
 
@@ -54,37 +49,6 @@ def read(files: Files) -> Flight:
         raise NegativeAnswer(f"the daemon has estimated nothing, see {files.said}")
     k = np.array([[float(row[name]) for name in FAULTS] for row in rows])
     return Flight(np.array([int(row["cycle"]) for row in rows]), k, estimates)
-
-
-def replayed(files: Files, flight: Flight) -> int:
-    """Run the logged frames through the identifiers again: how many estimates are the same bit for bit, all of them.
-
-    Raises
-    ------
-    NegativeAnswer
-        One differs.
-    """
-    settings = config.validate(
-        yaml.safe_load(files.daemon.read_text(encoding="utf-8"))["monitor"], MonitorSettings, files.daemon
-    )
-    bundle = {0: bundles.load(files.bundle)}
-    n_same = 0
-    with LogReader(files.log) as log:
-        batches = (batch.frames for batch in log.frames())
-        for out in answers(batches, Monitor(bundle, codec.default(), settings), Runner(bundle)):
-            if isinstance(out, Identified):
-                logged = flight.estimates[out.estimate.method].get(out.cycle)
-                if logged is None or logged["k"] != _plain(out.estimate.k) or logged["sd"] != _plain(out.estimate.sd):
-                    raise NegativeAnswer(f"replayed, cycle {out.cycle} gives another {out.estimate.method} estimate")
-                n_same += 1
-    n_logged = sum(map(len, flight.estimates.values()))
-    if n_same != n_logged:
-        raise NegativeAnswer(f"replayed, the log gives {n_same} estimates, the daemon gave {n_logged}")
-    return n_same
-
-
-def _plain(values: np.ndarray) -> list[float | None]:
-    return [None if np.isnan(x) else x for x in values.tolist()]
 
 
 def table(flight: Flight) -> Table:

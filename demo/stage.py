@@ -31,6 +31,7 @@ class Files:
     log = property(lambda self: self.out / "log")
     said = property(lambda self: self.out / "daemon.txt")
     simulator_said = property(lambda self: self.out / "simulator.txt")
+    replayed = property(lambda self: self.out / "replay.json")
     table = property(lambda self: self.out / "estimates.csv")
     plot = property(lambda self: self.out / "estimates.png")
     report = property(lambda self: self.out / "report.html")

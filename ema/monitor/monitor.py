@@ -73,7 +73,11 @@ class Monitor:
 
     def update(self, frames: np.ndarray) -> list[Output]:
         """Take frames in the order they were received, shape (n,), FRAME_DTYPE; in batches of any size."""
-        return list(self._answers(self._assembler.feed(frames)))
+        return list(self.stream(frames))
+
+    def stream(self, frames: np.ndarray) -> Iterator[Output]:
+        """As `update`, each answer as soon as it is found; to be exhausted before the next frames are given."""
+        yield from self._answers(self._assembler.feed(frames))
 
     def finish(self) -> list[Output]:
         """No more frames will come: close what is open."""
