@@ -41,3 +41,11 @@ def test_effects_belong_to_their_actuator(fleet):
     simulated, _ = fleet(text + "\nnoise: false")
     i = simulated.next_cycle(np.zeros((2, 6))).response.i[:, 0].mean(axis=1)
     assert i[1] - i[0] > 1.0
+
+
+def test_the_same_scenario_is_the_same_flight(fleet):
+    text = "seed: 5\nactuators: [{number: 1}, {number: 2}]"
+    k = np.full((2, 6), 0.02)
+    (one, _), (other, _) = fleet(text), fleet(text)
+    for _ in range(2):
+        assert np.array_equal(one.next_cycle(k).response.i, other.next_cycle(k).response.i)
