@@ -1,0 +1,121 @@
+"""The report's page from a log."""
+
+from __future__ import annotations
+
+import base64
+import json
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+import matplotlib
+import yaml
+from markupsafe import Markup
+
+from ema.core.names import FAULT_MEANING, FAULTS
+from ema.log import LogReader
+
+from .health import Health, health
+from .history import ActuatorHistory, History, read
+from .report_settings import ReportSettings, Severity
+from .times import iso
+
+
+def page(log: LogReader, settings: ReportSettings) -> str:
+    """HTML of the report. LogError when the log holds no estimate."""
+    matplotlib.use("svg")
+    history = read(log)
+    attachments = log.attachments()
+    actuators = [_actuator(one, health(one, settings, history.last_ns), settings, history) for one in
+                 history.actuators.values()]  # fmt: skip
+    return (
+        _environment()
+        .get_template("report.html.j2")
+        .render(
+            actuators=actuators,
+            history=history,
+            settings=settings,
+            faults=FAULTS,
+            meanings=FAULT_MEANING,
+            begin=iso(history.first_ns),
+            end=iso(history.last_ns),
+            duration=span((history.last_ns - history.first_ns) / 1e9),
+            logs=log.paths,
+            unfinished=log.unfinished,
+            damage=log.damage,
+            software=log.metadata().get("software", "not named in the log"),
+            reporter=f"ema-monitor {version('ema-monitor')}",
+            bundles=_bundles(attachments),
+            daemon_yaml=attachments.get("daemon.yaml", b"").decode(errors="replace"),
+            report_yaml=yaml.safe_dump(settings.model_dump(mode="json"), sort_keys=False),
+            css=Markup(files(__package__).joinpath("report.css").read_text(encoding="utf-8")),
+        )
+    )
+
+
+def span(seconds: float) -> str:
+    """A length of time for people."""
+    for limit, unit, name in ((120, 1, "s"), (7200, 60, "min"), (172800, 3600, "h")):
+        if seconds < limit:
+            return f"{seconds / unit:.3g} {name}"
+    return f"{seconds / 86400:.3g} d"
+
+
+def _badge(severity: Severity | None) -> Markup:
+    name = "unknown" if severity is None else Severity(severity).name.lower()
+    return Markup('<span class="badge {0}">{0}</span>').format(name)
+
+
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(lambda name: files(__package__).joinpath(name).read_text(encoding="utf-8")),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.globals.update(badge=_badge, iso=iso, span=span)
+    return environment
+
+
+def _actuator(actuator: ActuatorHistory, now: Health, settings: ReportSettings, history: History) -> dict[str, Any]:
+    from . import figures
+
+    envelopes = []
+    if actuator.last is not None:
+        envelopes.append((f"cycle {actuator.last['cycle']}, the last", actuator.last))
+    if actuator.worst is not None and "measured" in actuator.worst:
+        caption = f"cycle {actuator.worst['cycle']}, the least likely (p = {actuator.worst_p:.2g})"
+        envelopes.append((caption, actuator.worst))
+    return {
+        "history": actuator,
+        "health": now,
+        "trend": _inline(figures.trend(actuator, now, settings, history.first_ns)),
+        "envelopes": [{"caption": text, "src": _inline(figures.envelope(content))} for text, content in envelopes],
+    }
+
+
+def _inline(svg: str) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode()
+
+
+def _bundles(attachments: dict[str, bytes]) -> list[dict[str, str]]:
+    found = []
+    for name, data in sorted(attachments.items()):
+        if not name.startswith("manifest"):
+            continue
+        try:
+            manifest = json.loads(data)
+            plant = manifest.get("plant", {})
+            found.append(
+                {
+                    "name": name,
+                    "software": str(manifest.get("software", "?")),
+                    "plant": str(plant.get("name", "?")),
+                    "plant_hash": str(manifest.get("plant_hash", "?")),
+                }
+            )
+        except (ValueError, AttributeError):
+            found.append({"name": name, "software": "?", "plant": "damaged", "plant_hash": "?"})
+    return found

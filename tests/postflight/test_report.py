@@ -1,0 +1,150 @@
+"""The report in a real browser: numbers equal the log's, every picture is visible, nothing is loaded, nothing fails."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+from ema_postflight.health import severities
+from ema_postflight.report import report
+from ema_postflight.report_settings import ReportSettings, Severity
+
+from ema.core import config, resources
+from ema.core.errors import ConfigError, LogError
+from ema.log import LogReader
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+LOOK = """<script>addEventListener("load", () => {
+  const pictures = [...document.images].map(i => ({w: i.naturalWidth, shown: i.getBoundingClientRect().width}));
+  const k = [...document.querySelectorAll("[data-fault]")].map(e => ({...e.dataset, text: e.innerText}));
+  const counters = Object.fromEntries([...document.querySelectorAll("[data-counter]")]
+    .map(e => [e.dataset.counter, e.innerText]));
+  const seen = {pictures, k, counters, wide: document.documentElement.scrollWidth > innerWidth,
+    loaded: performance.getEntriesByType("resource").map(e => e.name).filter(n => !n.startsWith("data:"))};
+  const out = document.createElement("script"); out.type = "application/json"; out.id = "seen";
+  out.textContent = JSON.stringify(seen); document.body.append(out);
+})</script>"""
+
+
+@pytest.fixture(scope="module")
+def page(flight, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    answer = CliRunner().invoke(report, [str(flight), "--out", str(path)], catch_exceptions=False)
+    assert answer.exit_code == 0, answer.output
+    return path
+
+
+@pytest.fixture(scope="module")
+def browser(page):
+    """What a browser makes of the page, and what it complains of."""
+    if BROWSER is None:
+        pytest.skip("no chromium here: apt-get install chromium")
+    copy = page.with_name("looked-at.html")
+    copy.write_text(page.read_text().replace("</body>", LOOK + "</body>"))
+    profile = f"--user-data-dir={page.parent / 'profile'}"
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1280,900", "--enable-logging=stderr"]
+    command = [BROWSER, *options, profile, "--virtual-time-budget=5000", "--dump-dom", copy.as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    found = re.search(r'<script type="application/json" id="seen">(.*?)</script>', done.stdout, re.S)
+    complaints = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    return json.loads(found.group(1)), complaints
+
+
+def test_no_error_is_on_the_console_and_nothing_is_loaded(browser):
+    seen, complaints = browser
+    assert complaints == []
+    assert seen["loaded"] == []
+
+
+def test_every_picture_is_visible_and_the_page_fits_a_laptop(browser):
+    seen, _ = browser
+    assert len(seen["pictures"]) == 2 * 3  # for each actuator: trend, last and least likely envelope
+    assert all(p["w"] > 100 and p["shown"] > 100 for p in seen["pictures"])
+    assert not seen["wide"]
+
+
+def test_the_numbers_shown_are_those_of_the_log(browser, flight):
+    seen, _ = browser
+    with LogReader(flight) as log:
+        last = {m.content["actuator"]: m.content for m in log.messages(lambda t: t.startswith("/estimate"))}
+        status = [m.content for m in log.messages(lambda t: t == "/status")][-1]
+    assert len(seen["k"]) == 12
+    for cell in seen["k"]:
+        index = int(cell["fault"][1]) - 1
+        content = last[int(cell["actuator"])]
+        assert float(cell["k"]) == content["k"][index]
+        assert float(cell["sd"]) == content["sd"][index]
+        assert cell["text"].split()[0] == f"{content['k'][index]:.3f}"
+    assert {name: int(n) for name, n in seen["counters"].items()} == status["counters"]
+
+
+def test_the_page_holds_what_it_should(page):
+    text = page.read_text()
+    for part in ("Health now", "remaining life", "Changes of severity", "Envelope at the schedule", "lost frames",
+                 "one frame lost", "Data quality", "starts of the daemon", "manifest.json", "ema-monitor"):  # fmt: skip
+        assert part in text, part
+    assert re.findall(r'(?:src|href)="(?!data:)', text) == []
+    assert "http" not in re.sub(r'base64,[^"]*', "", text)
+
+
+def test_what_a_log_says_is_never_taken_for_markup(flight, tmp_path):
+    from ema.log import LogWriter, contents
+
+    with LogReader(flight) as old, LogWriter(tmp_path, {"daemon.yaml": b"</pre><script>alert(1)</script>"}) as new:
+        for message in old.messages(lambda t: t.startswith("/estimate")):
+            new.estimate(message.content)
+        new.event(contents.event(message.t_ns, "info", "x", "<img src=x onerror=alert(1)>"))
+    CliRunner().invoke(report, [str(tmp_path), "--out", str(tmp_path / "r.html")], catch_exceptions=False)
+    text = (tmp_path / "r.html").read_text()
+    assert "<script" not in text
+    assert "<img src=x" not in text
+
+
+def test_severity_needs_persistence():
+    settings = config.load(resources.config("report.yaml"), ReportSettings)
+    ok, watch, warning = 0.01, 0.10, 0.20
+
+    def run(*k):
+        return severities(np.array(k), "k1", settings)
+
+    assert run(ok, ok, ok, warning, ok, warning, ok) == [(0, Severity.OK)]
+    assert run(ok, ok, ok, watch, warning, watch, watch) == [(0, Severity.OK), (5, Severity.WATCH)]
+    assert run(warning, warning, warning, ok, watch, ok) == [(0, Severity.WARNING), (5, Severity.WATCH)]
+    assert run(ok) == [(0, Severity.OK)]
+
+
+def test_thresholds_come_from_the_configuration(flight, tmp_path):
+    thresholds = yaml.safe_load(resources.config("report.yaml").read_text())
+    thresholds["severity"]["k1"] = {"watch": 0.9, "warning": 0.95, "alarm": 0.99}
+    (tmp_path / "r.yaml").write_text(yaml.safe_dump(thresholds))
+    arguments = [str(flight), "--out", str(tmp_path / "r.html"), "--config", str(tmp_path / "r.yaml")]
+    CliRunner().invoke(report, arguments, catch_exceptions=False)
+    assert "Changes of severity" not in (tmp_path / "r.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"severity": {}}, "severity must name k1"),
+        ({"persistence": 0}, "persistence"),
+        ({"colour": "red"}, "'colour' is unknown"),
+    ],
+)
+def test_a_wrong_configuration_is_refused(flight, tmp_path, change, message):
+    thresholds = yaml.safe_load(resources.config("report.yaml").read_text()) | change
+    (tmp_path / "r.yaml").write_text(yaml.safe_dump(thresholds))
+    arguments = [str(flight), "--out", str(tmp_path / "r.html"), "--config", str(tmp_path / "r.yaml")]
+    with pytest.raises(ConfigError, match=message):
+        CliRunner().invoke(report, arguments, catch_exceptions=False)
+
+
+def test_nothing_is_overwritten_and_an_empty_log_is_told(flight, page, tmp_path):
+    with pytest.raises(LogError, match="exists"):
+        CliRunner().invoke(report, [str(flight), "--out", str(page)], catch_exceptions=False)
+    arguments = [str(flight), "--out", str(tmp_path / "r.html"), "--start", "9999"]
+    with pytest.raises(LogError, match="no estimate"):
+        CliRunner().invoke(report, arguments, catch_exceptions=False)
