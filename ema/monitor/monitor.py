@@ -22,7 +22,10 @@ from .sampling import Sampler
 from .settings import MonitorSettings
 
 FIRST = "linear"  # the identifier of every cycle
-_DEGRADING = Reason.LOST_FRAMES | Reason.SATURATED | Reason.START_STATE_UNKNOWN | Reason.MODEL_IN_DOUBT
+ARBITER = "lf2"  # says whether residuals too large for FIRST are the model's fault or only its linearisation's
+_DEGRADING = (
+    Reason.LOST_FRAMES | Reason.SATURATED | Reason.START_STATE_UNKNOWN | Reason.MODEL_IN_DOUBT | Reason.OUT_OF_RANGE
+)
 
 
 class _Channel:
@@ -114,19 +117,38 @@ class Monitor:
     def _concluded(self, job: Job, estimate: Estimate) -> Iterator[Output]:
         doubt = self._channels[job.actuator].doubts[job.method]
         changed = doubt.update(job.cycle, estimate.p_value)
-        reasons = estimate.reasons | job.reasons
-        if doubt.doubted:
-            reasons |= Reason.MODEL_IN_DOUBT
+        reasons = self._reasons(job, estimate)
         status = max(estimate.status, Status.DEGRADED if reasons & _DEGRADING else Status.VALID)
         yield Identified(job.t_ns, job.actuator, job.cycle, replace(estimate, status=status, reasons=reasons))
         if changed:
-            yield _judgement(job, doubt)
+            yield _judgement(job, doubt, job.method == FIRST and ARBITER in self._settings.slower)
+
+    def _reasons(self, job: Job, estimate: Estimate) -> Reason:
+        """Reasons of estimate and cycle, with what the model check makes of them.
+
+        Residuals too large for the linear model may only mean that a fault has left its range. So they are put down
+        to that, until the arbiter, which follows faults farther, doubts the model too.
+        """
+        channel = self._channels[job.actuator]
+        reasons = estimate.reasons | job.reasons
+        if channel.doubts[job.method].doubted:
+            reasons |= Reason.MODEL_IN_DOUBT
+        if job.method == FIRST and ARBITER in channel.doubts:
+            if channel.doubts[ARBITER].doubted:
+                reasons |= Reason.MODEL_IN_DOUBT
+            elif reasons & Reason.MODEL_IN_DOUBT:
+                reasons = reasons & ~Reason.MODEL_IN_DOUBT | Reason.OUT_OF_RANGE
+        return reasons
 
     def _jobs(self, channel: _Channel, first: Job) -> Iterator[Job]:
-        """The first usable cycle of every interval, by the frames' own time: live and replay choose the same."""
+        """The first usable cycle of every interval, by the frames' own time: live and replay choose the same.
+
+        While cycles speak against the linear model, its arbiter is asked in each of them.
+        """
         for method, slower in self._settings.slower.items():
             interval = first.t_ns // round(slower.every * 1e9)
-            if interval != channel.chosen[method]:
+            asked = method == ARBITER and bool(channel.doubts[FIRST].cycles)
+            if interval != channel.chosen[method] or asked:
                 channel.chosen[method] = interval
                 yield replace(first, method=method)
 
@@ -140,10 +162,12 @@ def _sampled(channel: _Channel, job: Job, estimate: Estimate) -> SampledEnvelope
     return SampledEnvelope(job.t_ns, job.actuator, job.cycle, channel.t, measured, measured - estimate.residual, sd)
 
 
-def _judgement(job: Job, doubt: ModelDoubt) -> Event:
+def _judgement(job: Job, doubt: ModelDoubt, arbitrated: bool) -> Event:
     if doubt.doubted:
         cycles = ", ".join(map(str, doubt.cycles))
         text = f"{job.method}: the residuals of cycles {cycles} are larger than the noise explains"
+        if arbitrated:
+            return Event(job.t_ns, Level.INFO, "beyond_linear", f"{text}; {ARBITER} is asked", job.actuator)
         return Event(job.t_ns, Level.WARNING, "model_in_doubt", text, job.actuator)
     text = f"{job.method}: the noise explains the residuals again, last of cycle {job.cycle}"
     return Event(job.t_ns, Level.INFO, "model_trusted", text, job.actuator)

@@ -189,9 +189,21 @@ def test_another_actuator_than_the_bundle_knows_puts_the_model_in_doubt(bench, f
     odd = {"n_cycles": 6, "seed": 5, "actuators": [{"effects": {"viscous_drag": {"coefficient": 2e-4}}}]}
     outputs = bench.outputs(fly(**odd))
     events = [o for o in outputs if isinstance(o, Event)]
-    assert [e.code for e in events if e.text.startswith("linear")] == ["model_in_doubt"]
+    assert [e.code for e in events if e.text.startswith("linear")] == ["beyond_linear"]
     assert "cycles 0, 1, 2 are larger" in events[0].text
+    assert [e.code for e in events if e.text.startswith("lf2")] == ["model_in_doubt"]
     last = linear(outputs)[-1].estimate
     assert last.reasons & Reason.MODEL_IN_DOUBT
     assert last.status is Status.DEGRADED
     assert not any(isinstance(o, Event) for o in bench.outputs(fly(**growing)))
+
+
+def test_a_large_fault_is_not_taken_for_a_wrong_model(bench, fly):
+    """A short far beyond the linear range: LF2 is asked, follows it, and nobody doubts the model."""
+    shorted = {"n_cycles": 8, "seed": 5, "actuators": [{"faults": {"k3": 0.2}}]}
+    outputs = bench.outputs(fly(**shorted))
+    assert "model_in_doubt" not in [o.code for o in outputs if isinstance(o, Event)]
+    assert not any(o.estimate.reasons & Reason.MODEL_IN_DOUBT for o in linear(outputs))
+    asked = [o for o in outputs if isinstance(o, Identified) and o.estimate.method == "lf2"]
+    assert len(asked) > 3
+    assert np.median([o.estimate.k[2] for o in asked]) == pytest.approx(0.2, abs=0.03)
