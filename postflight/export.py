@@ -10,7 +10,8 @@ from ema.core.errors import LogError
 
 from .times import TimeOption, time_range
 
-_WHAT = ("estimates", "envelopes", "events", "status", "signals")
+_TABLES = ("estimates", "envelopes", "events", "status")
+_WHAT = (*_TABLES, "signals", "cycles")
 
 
 @click.command()
@@ -21,7 +22,10 @@ _WHAT = ("estimates", "envelopes", "events", "status", "signals")
 )  # fmt: skip
 @click.option("--format", "kind", type=click.Choice(["csv", "parquet"]), default="csv", show_default=True)
 @click.option(
-    "--what", multiple=True, type=click.Choice(_WHAT), help="Which tables (repeatable; default: all but the signals)."
+    "--what",
+    multiple=True,
+    type=click.Choice(_WHAT),
+    help="Which tables (default: the first four).",
 )
 @time_range
 def export(
@@ -29,12 +33,14 @@ def export(
 ) -> None:
     """Write estimates, envelopes, events, status and decoded signals as tables with units in the header.
 
-    With a file name of another tool as --out, the raw frames go there. Nothing is overwritten.
+    The cycles of each actuator become a record that `ema identify` and `ema discrepancy` read. With a file name of
+    another tool as --out, the raw frames go there. Nothing is overwritten.
 
     \b
     Examples:
       ema export /var/log/ema --out tables
       ema export flight.mcap --out tables --format parquet --what estimates --what signals
+      ema export flight.mcap --out records --what cycles
       ema export flight.mcap --out flight.blf --start 10 --end 20
     """
     from .open_log import open_log, open_mcap
@@ -46,14 +52,17 @@ def export(
             click.echo(f"{out}: {_frames(log.frames(), out)} frames")
             return
     from .table_files import TableFiles
-    from .tables import codec_of, message_blocks, signal_blocks
+    from .tables import codec_of, cycle_blocks, message_blocks, signal_blocks
 
-    wanted = set(what or _WHAT[:-1])
+    wanted = set(what or _TABLES)
     with open_mcap(logs, start, end) as log, TableFiles(out, kind) as files:
         for block in message_blocks(log, wanted):
             files.write(block)
         if "signals" in wanted:
             for block in signal_blocks(codec_of(log), log.frames()):
+                files.write(block)
+        if "cycles" in wanted:
+            for block in cycle_blocks(log):
                 files.write(block)
         for path, rows in files.rows.items():
             click.echo(f"{path}: {rows} rows")

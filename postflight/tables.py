@@ -13,9 +13,10 @@ from ema.bus.codec import Codec, Message
 from ema.bus.identifiers import actuator, message_id
 from ema.bus.protection import Check, Receiver
 from ema.core.errors import LogError
-from ema.core.names import FAULTS
+from ema.core.names import CHANNELS, FAULTS
 from ema.log import LogReader
 from ema.log.reader import FrameBatch
+from ema.monitor.recorded import cycles
 
 _BLOCK = 2000  # rows
 
@@ -89,6 +90,14 @@ def signal_blocks(codec: Codec, batches: Iterator[FrameBatch]) -> Iterator[Block
             mine = (ids == message.frame_id) & (frames["length"] == message.length)
             if mine.any():
                 yield _signals(message, bus, frames[mine], checks[mine])
+
+
+def cycle_blocks(log: LogReader) -> Iterator[Block]:
+    """Recorded cycles without gaps, one table for each actuator, as records."""
+    for number, cycle in cycles(log):
+        columns = [Column("cycle", ""), *(Column(name, CHANNELS[name].unit) for name in cycle.channels)]
+        values = [[cycle.number] * cycle.n_samples, *(channel.tolist() for channel in cycle.channels.values())]
+        yield Block(f"cycles-{number}", columns, values)
 
 
 def codec_of(log: LogReader) -> Codec:

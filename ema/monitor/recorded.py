@@ -1,0 +1,120 @@
+"""A daemon's log as a record: its cycles, assembled as the monitor does, for every command that takes records.
+
+Positions come at a tenth of the rate of the currents and are interpolated; supply voltage and winding temperature are
+the last ones heard before the cycle ended. A cycle with a gap is left out.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ema.bus import codec as codecs
+from ema.bus import identifiers
+from ema.bus.codec import Codec
+from ema.core.config import validate
+from ema.core.errors import RecordError
+from ema.core.records import Cycle, Record
+from ema.log import LogReader
+from ema.models.actuator import Actuator
+
+from .assembler import Assembler
+from .cycles import MOTION_RATIO, AssembledCycle
+from .settings import MonitorSettings
+
+_SUPPLY = ("u_dc", "temp_w")
+
+
+def read_mcap(path: Path) -> Record:
+    """The cycles of the one actuator in a log.
+
+    Raises
+    ------
+    RecordError
+        The log holds several actuators (`ema export --what cycles` takes them apart), or no whole cycle.
+    """
+    with LogReader(path) as log:
+        found: dict[int, list[Cycle]] = {}
+        for actuator, cycle in cycles(log):
+            found.setdefault(actuator, []).append(cycle)
+            if len(found) > 1:
+                numbers = " and ".join(map(str, sorted(found)))
+                raise RecordError(
+                    f"{path}: holds actuators {numbers}; 'ema export {path} --what cycles --out DIR' takes them apart"
+                )
+    if not found:
+        raise RecordError(f"{path}: no cycle without a gap in it")
+    return Record(tuple(next(iter(found.values()))), path)
+
+
+def cycles(log: LogReader) -> Iterator[tuple[int, Cycle]]:
+    """Actuator number and cycle, in the order they ended. RecordError when the log does not say whose they are."""
+    codec = codecs.default()
+    plants = _plants(log)
+    assembler = Assembler(codec, plants, MonitorSettings())
+    supply: dict[int, dict[str, float]] = {}
+    for _, frames in log.frames():
+        closed = [item for item in assembler.feed(frames) if isinstance(item, AssembledCycle)]
+        yield from _whole(closed, plants, supply)
+        _hear(codec, frames, supply)
+    closed = [item for item in assembler.finish() if isinstance(item, AssembledCycle)]
+    yield from _whole(closed, plants, supply)
+
+
+def _whole(
+    closed: list[AssembledCycle], plants: dict[int, Actuator], supply: dict[int, dict[str, float]]
+) -> Iterator[tuple[int, Cycle]]:
+    for cycle in closed:
+        motion = np.array([cycle.motion[name] for name in ("theta_u", "theta_m", "theta_cmd")])
+        if not cycle.missing.any() and np.isfinite(motion).all():
+            yield cycle.actuator, _cycle(cycle, plants[cycle.actuator], supply.get(cycle.actuator, {}))
+
+
+def _cycle(cycle: AssembledCycle, plant: Actuator, supply: dict[str, float]) -> Cycle:
+    n = cycle.i.shape[1]
+    index = np.arange(n)
+    t = index * cycle.span.period
+    coarse = np.arange(cycle.span.n_motion_samples) * MOTION_RATIO
+    theta_u = np.interp(index, coarse, cycle.motion["theta_u"])
+    theta_m = np.unwrap(cycle.motion["theta_m"])
+    turn = 2.0 * np.pi  # which turn the rotor is in, the user's position says
+    theta_m += turn * np.round((cycle.motion["theta_u"][0] * plant.transmission.GR - theta_m[0]) / turn)
+    channels = {
+        "t": t,
+        **dict(zip(("i_a", "i_b", "i_c"), cycle.i, strict=True)),
+        "theta_m": np.interp(index, coarse, theta_m),
+        "theta_u": theta_u,
+        "theta_cmd": np.interp(index, coarse, cycle.motion["theta_cmd"]),
+        **{name: np.full(n, value) for name, value in supply.items()},
+    }
+    return Cycle(cycle.span.cycle, channels, f"cycle {cycle.span.cycle}")
+
+
+def _hear(codec: Codec, frames: np.ndarray, supply: dict[int, dict[str, float]]) -> None:
+    message = codec.messages["Supply"]
+    own = frames[(identifiers.message_id(frames["id"]) == message.frame_id) & (frames["length"] == message.length)]
+    if len(own):
+        values = message.decode(own)
+        for row, number in enumerate(identifiers.actuator(own["id"]).tolist()):
+            supply[number] = {name: float(values[name][row]) for name in _SUPPLY}
+
+
+def _plants(log: LogReader) -> dict[int, Actuator]:
+    """Actuators by number, from the bundles' manifests in the log; one manifest is that of all actuators."""
+    plants: dict[int, Actuator] = {}
+    for name, data in log.attachments().items():
+        stem = name.removeprefix("manifest").removesuffix(".json")
+        if stem == name or not (stem == "" or stem[1:].isdecimal()):
+            continue
+        try:
+            plant = validate(json.loads(data)["plant"], Actuator, f"{name} in the log")
+        except (ValueError, KeyError, TypeError) as error:
+            raise RecordError(f"{log.paths[0]}: {name} in it is damaged") from error
+        numbers = range(identifiers.N_ACTUATORS) if stem == "" else [int(stem[1:])]
+        plants |= dict.fromkeys(numbers, plant)
+    if not plants:
+        raise RecordError(f"{log.paths[0]}: names no bundle, so how long a cycle is and whose is not known")
+    return plants

@@ -1,0 +1,58 @@
+"""A daemon's log as a record."""
+
+import json
+
+import numpy as np
+import pytest
+
+from ema.core.errors import RecordError
+from ema.core.records import read_record
+from ema.identification import identifier
+from ema.identification.recorded import measurements
+from ema.log import LogReader, LogSettings, LogWriter
+from ema.monitor.recorded import cycles
+
+
+def _log(directory, flight, bundle):
+    directory.mkdir()
+    manifest = json.dumps(bundle.manifest).encode()
+    with LogWriter(directory, {"manifest.json": manifest}, LogSettings(keep_free=0)) as log:
+        for _, frames in flight:
+            log.frames(frames, "vcan0")
+    return next(directory.glob("*.mcap"))
+
+
+def test_the_record_is_what_the_actuator_did_and_identifies_as_on_the_bus(fly, bench, coarse_bundle, tmp_path):
+    flight = fly(n_cycles=3, seed=4, actuators=[{"number": 5, "faults": {"k1": 0.1}}])
+    record = read_record(_log(tmp_path / "log", flight, coarse_bundle))
+    assert record.n_cycles == 3
+    live = bench.linear(flight, 5)
+    linear = identifier("linear", coarse_bundle)
+    for measured, out in zip(measurements(record, coarse_bundle.plant, coarse_bundle.schedule), live, strict=True):
+        assert np.allclose(linear.estimate(measured).k, out.estimate.k, atol=1e-9)
+    for name in ("theta_u", "theta_m", "theta_cmd", "u_dc", "temp_w"):
+        assert name in record.channels
+
+
+def test_several_actuators_are_taken_apart(fly, coarse_bundle, tmp_path):
+    flight = fly(n_cycles=2, seed=4, actuators=[{"number": 0}, {"number": 9}])
+    path = _log(tmp_path / "log", flight, coarse_bundle)
+    with LogReader(path) as log:
+        assert sorted((number, cycle.number) for number, cycle in cycles(log)) == [(0, 0), (0, 1), (9, 0), (9, 1)]
+    with pytest.raises(RecordError, match=r"holds actuators 0 and 9.*--what cycles"):
+        read_record(path)
+
+
+def test_a_cycle_with_a_gap_is_left_out(fly, coarse_bundle, tmp_path):
+    flight = fly(n_cycles=3, seed=4)
+    currents = flight[1][1]
+    flight[1] = (flight[1][0], np.delete(currents, 100))
+    record = read_record(_log(tmp_path / "log", flight, coarse_bundle))
+    assert [cycle.number for cycle in record] == [0, 2]
+
+
+def test_a_log_that_does_not_say_whose_cycles_is_refused(fly, tmp_path):
+    with LogWriter(tmp_path, {}, LogSettings(keep_free=0)) as log:
+        log.frames(fly(n_cycles=3, seed=4)[0][1], "vcan0")
+    with pytest.raises(RecordError, match="names no bundle"):
+        read_record(next(tmp_path.glob("*.mcap")))
