@@ -105,7 +105,11 @@ def rows() -> list[dict[str, Any]]:
             parts = _median_each(lambda size=size: _way_in(before, frames, size, link, codec, plant))
             what = f"batches of {size}, {link.name}"
             row(f"frame in: receive, check, decode, place ({what})", parts[0] + parts[1], 5.0, PEER, peer_value)
-            row(f"  frames one core takes ({what})", 1e6 / sum(parts), BUS_FULL, unit="1/s")
+            row(
+                f"  frames one core takes; a full bus of 1 and 5 Mbit/s has {BUS_FULL} ({what})",
+                1e6 / sum(parts),
+                unit="1/s",
+            )
             row(f"  of which receive ({what})", parts[0])
             row(
                 f"  of which check alone (batches of {size})",
