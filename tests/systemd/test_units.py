@@ -12,7 +12,7 @@ import pytest
 from ema.core import resources
 
 ROOT = Path(__file__).resolve().parents[2]
-UNITS = ["ema-daemon@.service"]
+UNITS = ["ema-daemon@.service", "ema-hf-worker@.service"]
 MOST_EXPOSURE = 1.2
 NEWER_THAN_DEBIAN_12 = ("RestartSteps", "RestartMaxDelaySec")  # systemd 254; older ones warn and go on
 
