@@ -32,9 +32,9 @@ def make_bundle(files: stage.Files, console: Console) -> None:
     except BundleError:
         fits = False
     if fits:
-        console.print(f"[bold]bundle[/] {files.bundle} is used again")
+        console.print(f"bundle {files.bundle} is used again")
         return
-    console.print("[bold]bundle[/] is built by 'ema build' (under a minute)")
+    console.print("bundle is built by 'ema build' (under a minute)")
     words = ("build", "--config", resources.config("builder-quick.yaml"), "--out", files.bundle)
     stage.finished(stage.run(*words), "build")
 

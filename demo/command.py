@@ -33,7 +33,7 @@ def demo(out: Path, bus: str, n_cycles: int | None) -> None:
     files.prepare()
     chain.make_bundle(files, console)
     name, why = chain.choose_bus(bus)
-    console.print(f"[bold]bus[/]    {why}")
+    console.print(why)
     chain.write_configuration(files, name, n_cycles)
     chain.fly(files, name, console)
     flight = results.read(files)

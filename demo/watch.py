@@ -12,7 +12,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from ema.bus import codec
 from ema.bus.interface import open_bus, parse
 from ema.core.names import FAULTS
-from ema.core.status import Status
+
+SHOWN_FROM = 0.005  # a fault
 
 
 class Watch:
@@ -22,7 +23,7 @@ class Watch:
         self._codec = codec.default()
         self._port = open_bus(parse(bus), self._codec.filters("Monitor"))
         self._bar = Progress(
-            TextColumn("[bold]flight[/]"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+            TextColumn("flight"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
             TextColumn("{task.description}"), console=console,
         )  # fmt: skip
         self._task = self._bar.add_task("simulator starts", total=n_cycles)
@@ -34,9 +35,9 @@ class Watch:
             for message, frames in self._codec.split(self._port.read(left)):
                 if message.name == "EstimateLinear":
                     values = message.decode(frames)
-                    k = "  ".join(f"{name} {x:.3f}" for name, x in zip(FAULTS, values["k"][-1], strict=True))
-                    status = Status(int(values["status"][-1])).name.lower()
-                    self._bar.update(self._task, advance=len(frames), description=f"{k}  {status}")
+                    k = zip(FAULTS, values["k"][-1], strict=True)
+                    seen = " ".join(f"{name} {x:.3f}" for name, x in k if x >= SHOWN_FROM) or "no fault seen"
+                    self._bar.update(self._task, advance=len(frames), description=seen)
 
     def __enter__(self) -> Self:
         self._bar.start()
