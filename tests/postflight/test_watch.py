@@ -1,0 +1,122 @@
+"""The live view: what is on the bus is on the screen; nothing is sent; the terminal is left clean."""
+
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ema_postflight.live import Live
+from ema_postflight.watch import draw
+from rich.console import Console
+
+from ema.bus import codec as codecs
+from ema.bus.interface import open_bus, parse
+from ema.bus.protection import Sender
+from ema.core.status import Reason, Status
+
+T0 = 1_741_943_700_000_000_000
+
+
+@pytest.fixture
+def frame():
+    """Protected frames as the daemon sends them."""
+    codec, sender = codecs.default(), Sender()
+
+    def make(name, actuator=0, t_ns=T0, **values):
+        fields = codec.messages[name].fields
+        zero = {key: np.zeros((1, f.n_values)) if f.n_values else 0 for key, f in fields.items()}
+        return sender.protect(codec.encode(name, actuator, zero | values, t_ns))
+
+    return make
+
+
+def _estimate(frame, actuator, cycle, k, status=Status.VALID, reason=0, name="EstimateLinear"):
+    values = {"cycle": cycle, "k": np.array([k]), "sd_k": np.full((1, 6), 0.01)}
+    return frame(name, actuator, status=int(status), reason=int(reason), **values)
+
+
+def _text(state, now_ns=T0):
+    console = Console(width=200, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
+    console.print(draw(state, "bus vcan0", now_ns))
+    console.file.close()
+    return console.export_text()
+
+
+def test_estimates_cycles_heartbeat_and_losses_are_shown(frame):
+    state = Live(codecs.default())
+    state.update(_estimate(frame, 3, 17, [0.15, 0, 0, 0.05, 0, 0]))
+    state.update(frame("Heartbeat", state=1, uptime=5, n_cycles=18, n_lost=2))
+    text = _text(state)
+    for part in ("0.150 ±0.010", "0.050 ±0.010", "17", "valid", "daemon running, up 5 s", "lost 2", "cycles 18"):
+        assert part in text, part
+    assert "█" * 8 + "░" in text  # half a bar for k1
+
+
+def test_changes_become_events(frame):
+    state = Live(codecs.default())
+    state.update(_estimate(frame, 3, 1, [0] * 6))
+    state.update(frame("Heartbeat", state=1, uptime=1))
+    state.update(_estimate(frame, 3, 2, [0] * 6, Status.DEGRADED, Reason.LOST_FRAMES))
+    state.update(frame("Heartbeat", state=2, uptime=2, n_lost=3, log_state=1))
+    state.look(T0 + 10**10)
+    text = " / ".join(event for _, event in state.events)
+    assert "actuator 3: linear is degraded (lost frames)" in text
+    assert "daemon is degraded / log is full / frames at the daemon: 3 lost / no heartbeat for 3 s" in text
+    assert "daemon silent" in _text(state)
+
+
+def test_a_forged_frame_shows_nothing(frame):
+    state = Live(codecs.default())
+    forged = _estimate(frame, 3, 1, [0.9] * 6)
+    forged["data"][0, 20] ^= 1
+    state.update(forged)
+    assert not state.estimates
+    assert state.n_bad == 1
+    assert "nothing heard" in _text(state)
+
+
+def test_a_terminal_is_left_clean_and_nothing_is_sent(frame):
+    port = open_bus(parse("udp_multicast:239.74.163.44"))
+    leader, follower = pty.openpty()
+    command = [str(Path(sys.executable).with_name("ema")), "watch", "--bus", "udp_multicast:239.74.163.44"]
+    environment = os.environ | {"TERM": "xterm", "COLUMNS": "180", "LINES": "40"}
+    process = subprocess.Popen(command, stdout=follower, stderr=follower, stdin=follower, env=environment)
+    os.close(follower)
+    shown, received = b"", []
+    try:
+        os.set_blocking(leader, False)
+        end = time.monotonic() + 60
+        number = 0
+        while b"0.123" not in shown and time.monotonic() < end and process.poll() is None:
+            number += 1
+            port.write(_estimate(frame, 2, number, [0.123] * 6))
+            received.append(port.read(0.1))
+            shown += _read(leader)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) == 0
+        shown += _read(leader)
+    finally:
+        process.kill()
+        process.wait()
+        os.close(leader)
+        port.close()
+    assert b"0.123" in shown
+    assert shown.count(b"\x1b[?1049h") == shown.count(b"\x1b[?1049l") == 1  # alternate screen entered and left
+    assert shown.rfind(b"\x1b[?25h") > shown.rfind(b"\x1b[?25l")  # the cursor is visible again
+    assert b"Traceback" not in shown
+    assert {int(i) for batch in received for i in batch["id"]} <= {int(_estimate(frame, 2, 0, [0] * 6)["id"][0])}
+
+
+def _read(leader):
+    data = b""
+    try:
+        while part := os.read(leader, 65536):
+            data += part
+    except OSError:
+        pass
+    return data
