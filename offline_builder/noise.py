@@ -64,7 +64,8 @@ def model_error(model: Model, sets: Sets, S: np.ndarray, known: KnownError | Non
         M = (e1 / q) @ e2.T / len(k)
         lam, U = np.linalg.eigh(0.5 * (M + M.T))
         chance = np.sqrt(len(S) / len(k)) * float(np.mean(1.0 / q))
-        lam = np.where(lam > chance, lam, max(float(np.mean(lam[lam <= chance])), 0.0))
+        rest = lam[lam <= chance]
+        lam = np.where(lam > chance, lam, max(float(rest.mean()) if rest.size else 0.0, 0.0))
         energy = np.abs(np.einsum("ij,ij->j", e1, e2))  # a few large errors are worth few samples
         n = float(energy.sum() ** 2 / np.sum(energy**2))
         levels.append(unbiased(L @ (U * lam) @ U.T @ L.T, n))

@@ -1,0 +1,236 @@
+"""The paper's experiments and this project's beside them. Each is a function of the bench, and answers with numbers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from scipy.stats import qmc
+
+from ema.bundle import Bundle
+from ema.identification import Identifier, Measurement, identifier
+from ema.identification import lf1 as lf1_identifier
+from ema.identification.gauss_newton import GaussNewton
+from ema.identification.noise import NoiseModel
+from ema.identification.weighted import Whitener, bounded_least_squares
+from ema.models import hf, lf1
+from ema.reduction.schedules import SCHEDULES, Knowledge, schedule
+
+from .noise import shrunk, unbiased
+
+SEED = 20260301
+SETS = {"small": 0.05, "large": 0.3}
+N_TEST = 100
+N_TRAIN = 400
+N_POINTS = (6, 12, 20, 30, 50, 100, 200)
+METHODS = ("textbook linear", "textbook lf1", "textbook lf2", "linear", "lf1", "lf2", "hf")
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A bundle, and HF runs made for the comparison: none of them went into the bundle."""
+
+    bundle: Bundle
+    n_threads: int = 2
+
+    def runs(self, k: np.ndarray, stream: int) -> np.ndarray:
+        """Envelopes of fault vectors `k` (n, 6), shape (n, n_t). [A]"""
+        seeds = SEED + stream * 10**6 + np.arange(len(k))
+        return hf.simulate(self.bundle.plant, k, seeds=seeds, n_threads=self.n_threads).envelope
+
+    @cached_property
+    def tests(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """The two test sets: fault vectors (100, 6) and envelopes (100, n_t)."""
+        rng = np.random.default_rng(SEED)
+        faults = {name: rng.uniform(0.0, k_max, (N_TEST, 6)) for name, k_max in SETS.items()}
+        return {name: (k, self.runs(k, j)) for j, (name, k) in enumerate(faults.items())}
+
+    @cached_property
+    def training(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Campaigns over the ranges of the test sets, for regressions."""
+        unit = qmc.LatinHypercube(6, rng=np.random.default_rng(SEED + 1)).random(N_TRAIN)
+        return {name: (unit * k_max, self.runs(unit * k_max, 10 + j)) for j, (name, k_max) in enumerate(SETS.items())}
+
+    @cached_property
+    def nominal(self) -> np.ndarray:
+        """Runs without fault (N_TRAIN, n_t). [A]"""
+        return self.runs(np.zeros((N_TRAIN, 6)), 20)
+
+    def identifier(self, method: str) -> Callable[[np.ndarray], np.ndarray]:
+        """From an envelope at the schedule (n_omega,) to a fault vector (6,)."""
+        b = self.bundle
+        if method == "textbook linear":
+            Q, R = b.arrays["Q"], b.arrays["R"]
+            return lambda i_hat: np.linalg.solve(R, Q.T @ (i_hat - b.i0[b.schedule]))
+        plain = method.startswith("textbook")
+        made: Identifier = self._textbook(method.split()[1]) if plain else identifier(method, b)
+        return lambda i_hat: made.estimate(Measurement.complete(i_hat, np.zeros(2))).k
+
+    def _textbook(self, name: str) -> GaussNewton:
+        """The paper's iteration: no weights, nothing known of the model's error, started at k = 0."""
+        b, n = self.bundle, len(self.bundle.schedule)
+        zeros = np.zeros((len(b.arrays["noise_sizes"]), 1, 1))
+        noise = b.noise("linear")
+        plain = replace(noise, switching=1e-4 * np.eye(n), model_error=zeros, start=np.zeros((n, n)), known=None)
+        library, tuning = b.lf2().at(b.schedule), lf1.Tuning(*b.arrays["lf1_tuning"])
+        if name == "lf2":
+            return GaussNewton(name, lambda k, start: library(k), plain, lambda m: np.zeros(6))
+        return GaussNewton(
+            *(name, lambda k, start: lf1.simulate(b.plant, k, tuning)[:, b.schedule], plain, lambda m: np.zeros(6)),
+            lf1_identifier.OPTIONS,
+        )
+
+
+def err_k(k_hat: np.ndarray, k: np.ndarray) -> np.ndarray:
+    """Eq. (5) as it must be read.   ‖k̂ - k‖ / √6"""
+    return np.asarray(np.linalg.norm(k_hat - k, axis=-1) / np.sqrt(6.0))
+
+
+def err_i(i: np.ndarray, i_ref: np.ndarray) -> np.ndarray:
+    """Eq. (6).   ‖i - i_ref‖ / ‖i_ref‖"""
+    return np.asarray(np.linalg.norm(i - i_ref, axis=-1) / np.linalg.norm(i_ref, axis=-1))
+
+
+def timed(f: Callable[[], Any], n: int = 3) -> float:
+    """Best of `n` wall times. [s]"""
+    best = np.inf
+    for _ in range(n):
+        begin = time.perf_counter()
+        f()
+        best = min(best, time.perf_counter() - begin)
+    return float(best)
+
+
+def models(bench: Bench) -> dict[str, Any]:
+    """HF, LF1 and LF2 on the same fault vectors: err_i against a run of HF, and time per evaluation."""
+    b = bench.bundle
+    tuning, library = lf1.Tuning(*b.arrays["lf1_tuning"]), b.lf2()
+    evaluate: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "hf": lambda k: hf.simulate(b.plant, k, seeds=SEED + 7 * 10**6 + np.arange(len(k))).envelope,
+        "lf1": lambda k: lf1.simulate(b.plant, k, tuning),
+        "lf2": library,
+    }
+    answer: dict[str, Any] = {}
+    for name, model in evaluate.items():
+        errors = {s: float(np.median(err_i(model(k), x))) for s, (k, x) in bench.tests.items()}
+        k = bench.tests["small"][0][:16]
+        model(k)
+        answer[name] = {"err_i": errors, "time": timed(partial(model, k)) / 16}
+    return answer
+
+
+def identifiers(bench: Bench, method: str) -> dict[str, Any]:
+    """err_k, err_i and online time of one identifier on both test sets."""
+    b, estimate = bench.bundle, bench.identifier(method)
+    tuning, library = lf1.Tuning(*b.arrays["lf1_tuning"]), b.lf2()
+    answer: dict[str, Any] = {}
+    for name, (k, x) in bench.tests.items():
+        estimate(x[0][b.schedule])
+        begin = time.perf_counter()
+        k_hat = np.array([estimate(row[b.schedule]) for row in x])
+        seconds = (time.perf_counter() - begin) / len(k)
+        inside = np.clip(k_hat, 0.0, 1.0)
+        if method == "hf":
+            rebuilt = bench.runs(inside, 30)
+        elif "lf1" in method:
+            rebuilt = lf1.simulate(b.plant, inside, tuning)
+        elif "lf2" in method:
+            rebuilt = library(inside)
+        else:
+            rebuilt = b.i0 + k_hat @ b.arrays["A_full"].T
+        answer[name] = {
+            "err_k": err_k(k_hat, k).tolist(),
+            "err_i": err_i(rebuilt, x).tolist(),
+            "rms": np.sqrt(np.mean((k_hat - k) ** 2, axis=0)).tolist(),
+            "null": float(np.median(err_k(np.zeros(6), k))),
+            "time": seconds,
+        }
+    return answer
+
+
+def coverage(bench: Bench, method: str) -> dict[str, Any]:
+    """Share of true faults within the intervals, and of sound cycles whose test of fit fails."""
+    b, made = bench.bundle, identifier(method, bench.bundle)
+    answer: dict[str, Any] = {}
+    for name, (k, x) in bench.tests.items():
+        estimates = [made.estimate(Measurement.complete(row[b.schedule], np.zeros(2))) for row in x]
+        p = np.array([e.p_value for e in estimates])
+        share = {}
+        for level in (0.5, 0.9, 0.95):
+            low, high = np.moveaxis(np.array([e.interval(level) for e in estimates]), -1, 0)
+            share[f"{level:g}"] = float(np.mean((k >= low) & (k <= high)))
+        answer[name] = {"coverage": share, "rejected": {f"{a:g}": float(np.mean(p < a)) for a in (0.001, 0.01, 0.05)}}
+    return answer
+
+
+def schedules(bench: Bench) -> dict[str, Any]:
+    """Small test set, weighted linear identifier, every schedule at several numbers of points."""
+    b = bench.bundle
+    deviation = bench.nominal - bench.nominal.mean(axis=0)
+    know = Knowledge(b.t, b.arrays["v1"], b.arrays["A_full"], deviation.T @ deviation / len(deviation))
+    k, x = bench.tests["small"]
+    k_train, x_train = bench.training["small"]
+    answer: dict[str, Any] = {"n": list(N_POINTS)}
+    for name in SCHEDULES:
+        medians = []
+        for n in N_POINTS:
+            at = schedule(name, know, n, SEED)
+            A = know.A[at]
+            rest = (x_train - b.i0 - k_train @ know.A.T)[:, at]  # switching and what is not linear
+            white = Whitener(unbiased(shrunk(rest.T @ rest / len(rest), len(rest)), len(rest)))
+            k_hat = [bounded_least_squares(white(A), white(r), np.zeros(6), np.ones(6)).x for r in (x - b.i0)[:, at]]
+            medians.append(float(np.median(err_k(np.array(k_hat), k))))
+        answer[name] = medians
+    return answer
+
+
+def maps(bench: Bench) -> dict[str, Any]:
+    """Linear answers: Jacobian by differences, Jacobian regressed over a campaign, and the inverse map (ridge)."""
+    b = bench.bundle
+    at, i0 = b.schedule, b.i0[b.schedule]
+    answer: dict[str, Any] = {}
+    for name, (k, x) in bench.tests.items():
+        k_train, x_train = bench.training[name]
+        d, d_train = x[:, at] - i0, x_train[:, at] - i0
+        regressed = np.linalg.lstsq(k_train, d_train, rcond=None)[0].T
+        X, X_train = (np.column_stack([np.ones(len(m)), m]) for m in (d, d_train))
+        G = X_train.T @ X_train
+        inverse = np.linalg.solve(G + 1e-4 * np.trace(G) / len(G) * np.eye(len(G)), X_train.T @ k_train)
+        found = {
+            "differences": np.linalg.lstsq(b.A, d.T, rcond=None)[0].T,
+            "regressed": np.linalg.lstsq(regressed, d.T, rcond=None)[0].T,
+            "inverse map": X @ inverse,
+        }
+        answer[name] = {map_name: float(np.median(err_k(k_hat, k))) for map_name, k_hat in found.items()}
+    return answer
+
+
+def bound(bench: Bench) -> dict[str, Any]:
+    """Cramér–Rao bound of each fault at k = 0 from the schedule's points and one cycle."""
+    A, S = bench.bundle.A, bench.bundle.arrays["noise_switching"]
+    return {"sd": np.sqrt(np.diag(np.linalg.inv(A.T @ np.linalg.solve(S, A)))).tolist()}
+
+
+def combined(bench: Bench) -> dict[str, Any]:
+    """Several cycles of the same actuator, their envelopes averaged: LF1 identifier, small test set."""
+    b = bench.bundle
+    k = bench.tests["small"][0][:40]
+    x = np.array([bench.runs(k, 40 + j)[:, b.schedule] for j in range(8)])
+    answer: dict[str, Any] = {"n": [1, 2, 4, 8], "err_k": []}
+    for n in answer["n"]:
+        made: Any = identifier("lf1", b)
+        noise: NoiseModel = made.noise
+        made.noise = replace(noise, switching=noise.switching / n)
+        k_hat = [made.estimate(Measurement.complete(i, np.zeros(2))).k for i in x[:n].mean(axis=0)]
+        answer["err_k"].append(float(np.median(err_k(np.array(k_hat), k))))
+    return answer
+
+
+def qr_cost(bench: Bench) -> dict[str, Any]:
+    """QR of A at the schedule and over the whole cycle: the paper's six orders of magnitude."""
+    a, full = bench.bundle.A, bench.bundle.arrays["A_full"]
+    return {"schedule": timed(lambda: np.linalg.qr(a), 200), "full": timed(lambda: np.linalg.qr(full), 50)}

@@ -1,0 +1,84 @@
+"""`ema reproduce`: the paper's figures and table, with this project's beside them."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+@click.command(short_help="The paper's figures 1-2 and table 1, with this project's beside them.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="folder of results, figures and page")
+@click.option("--config", "config_path", type=click.Path(path_type=Path), help="builder YAML [default: the full one]")
+@click.option("--workers", type=click.IntRange(1, 512), default=None, help="processes (default: one for each core)")
+def reproduce(out: Path, config_path: Path | None, workers: int | None) -> None:
+    """Build the bundle (DIR/bundle), run every experiment, write figures and reproduction.md.
+
+    Each experiment's numbers are kept in DIR; an interrupted run goes on where it was when called again.
+
+    \b
+    Example:
+      ema reproduce --out reproduction
+    """
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    import ema.bundle
+    from ema.core import resources
+    from ema.core.config import digest
+    from ema.core.errors import ConfigError
+
+    from . import build, experiments, reproduction_figures, reproduction_page
+
+    builder, plant = build.read(config_path or resources.config("builder.yaml"))
+    out.mkdir(parents=True, exist_ok=True)
+    click.echo(f"seeds: builder {builder.seed}, experiments {experiments.SEED}", err=True)
+    path = out / "bundle"
+    if not path.exists():
+        with ProcessPoolExecutor(workers or os.cpu_count(), mp_context=get_context("spawn")) as pool:
+            build.build(builder, plant, path, pool, say=lambda text: click.echo(f"  {text}", err=True))
+    bundle = ema.bundle.load(path)
+    if bundle.manifest.get("builder_hash") != digest(builder):
+        raise ConfigError(f"{path}: was built from another configuration; remove it or choose another --out")
+    bench = experiments.Bench(bundle, workers or os.cpu_count() or 1)
+    results = {name: _stage(out, name, run) for name, run in _stages(bench).items()}
+    reproduction_figures.draw(out, bundle, results)
+    page = reproduction_page.page(bundle, results)
+    (out / "reproduction.md").write_text(page, encoding="utf-8")
+    click.echo(f"{out / 'reproduction.md'}")
+
+
+def _stages(bench: Any) -> dict[str, Callable[[], dict[str, Any]]]:
+    from . import experiments as e
+
+    stages: dict[str, Callable[[], dict[str, Any]]] = {
+        "models": lambda: e.models(bench),
+        "bound": lambda: e.bound(bench),
+        "qr": lambda: e.qr_cost(bench),
+        "maps": lambda: e.maps(bench),
+        "schedules": lambda: e.schedules(bench),
+        "combined": lambda: e.combined(bench),
+    }
+    for method in e.METHODS:
+        stages[f"identifier {method}"] = lambda method=method: e.identifiers(bench, method)  # type: ignore[misc]
+    for method in ("linear", "lf2", "lf1", "hf"):
+        stages[f"coverage {method}"] = lambda method=method: e.coverage(bench, method)  # type: ignore[misc]
+    return stages
+
+
+def _stage(out: Path, name: str, run: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """The experiment's numbers: from its file if it has been run, else run now."""
+    file = out / f"{name.replace(' ', '_')}.json"
+    if file.exists():
+        done: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        return done
+    click.echo(f"  {name}", err=True)
+    result = run()
+    unfinished = file.with_suffix(".part")
+    unfinished.write_text(json.dumps(result, indent=1), encoding="utf-8")
+    os.replace(unfinished, file)
+    return result
