@@ -81,7 +81,7 @@ def analyse(
     S = noise.switching(nominal[:, points], sets)
     A = A_full[points]
     trained = np.concatenate([np.arange(len(plan))[plan.groups[name]] for name in ("campaign", "scaled")])
-    k, x = plan.k[trained], envelopes[trained][:, points].astype(float)
+    k, x = plan.k[trained], envelopes[:, points][trained].astype(float)
 
     def linear(k: np.ndarray) -> np.ndarray:
         return i0[points] + k @ A.T

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor, Future
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from ema.models.actuator import Actuator
 from .runs import Plan
 
 BLOCK = 128  # runs per task: eight batches of lanes, most of a second's work
+N_AHEAD = 64  # tasks submitted and not yet written: with 2.6 MB each, memory stays bounded whatever the campaign
 
 
 def envelopes(plant: Actuator, k: np.ndarray, seeds: np.ndarray, start: np.ndarray) -> np.ndarray:
@@ -49,10 +51,14 @@ def run(
     missing = [block for block in blocks if not _file(work, block).exists()]
     done = len(plan) - sum(block.stop - block.start for block in missing)
     progress(done, len(plan))
-    futures = {pool.submit(envelopes, plant, plan.k[b], plan.seeds[b], plan.start[b]): b for b in missing}
+    ahead: deque[tuple[slice, Future[np.ndarray]]] = deque()
+    waiting = deque(missing)
     try:
-        for future in as_completed(futures):
-            block = futures[future]
+        while waiting or ahead:
+            while waiting and len(ahead) < N_AHEAD:
+                b = waiting.popleft()
+                ahead.append((b, pool.submit(envelopes, plant, plan.k[b], plan.seeds[b], plan.start[b])))
+            block, future = ahead.popleft()
             unfinished = _file(work, block).with_suffix(".part")
             with open(unfinished, "wb") as file:
                 np.save(file, future.result())
@@ -60,7 +66,7 @@ def run(
             done += block.stop - block.start
             progress(done, len(plan))
     except BaseException:
-        for future in futures:
+        for _, future in ahead:
             future.cancel()
         raise
     return _joined(work, blocks, len(plan), plant.n_samples)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import click
@@ -12,7 +11,8 @@ import click
 @click.option("--config", "config_path", required=True, type=click.Path(path_type=Path), help="builder YAML")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="folder of the bundle")
 @click.option("--workers", type=click.IntRange(1, 512), default=None, help="processes (default: one for each core)")
-def build(config_path: Path, out: Path, workers: int | None) -> None:
+@click.option("--scheduler", metavar="ADDRESS", help="a Dask cluster's, instead of this machine (extra: cluster)")
+def build(config_path: Path, out: Path, workers: int | None, scheduler: str | None) -> None:
     """Run the HF campaign and write the bundle the daemon works with.
 
     An interrupted build goes on where it was when called again.
@@ -20,21 +20,20 @@ def build(config_path: Path, out: Path, workers: int | None) -> None:
     \b
     Example:
       ema build --config config/builder-quick.yaml --out bundle
+      ema build --config config/builder.yaml --out bundle --scheduler tcp://10.0.0.1:8786
     """
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from . import build as phase
+    from .executors import executor
 
     builder, plant = phase.read(config_path)
     console = Console(stderr=True)
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
     )
-    with bar, ProcessPoolExecutor(workers or os.cpu_count(), mp_context=get_context("spawn")) as pool:
+    with bar, executor(workers, scheduler) as pool:
         task = bar.add_task("HF runs", total=None)
         made = phase.build(
             builder,

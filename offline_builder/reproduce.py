@@ -24,22 +24,20 @@ def reproduce(out: Path, config_path: Path | None, workers: int | None) -> None:
     Example:
       ema reproduce --out reproduction
     """
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
     import ema.bundle
     from ema.core import resources
     from ema.core.config import digest
     from ema.core.errors import ConfigError
 
     from . import build, experiments, reproduction_figures, reproduction_page
+    from .executors import executor
 
     builder, plant = build.read(config_path or resources.config("builder.yaml"))
     out.mkdir(parents=True, exist_ok=True)
     click.echo(f"seeds: builder {builder.seed}, experiments {experiments.SEED}", err=True)
     path = out / "bundle"
     if not path.exists():
-        with ProcessPoolExecutor(workers or os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        with executor(workers) as pool:
             build.build(builder, plant, path, pool, say=lambda text: click.echo(f"  {text}", err=True))
     bundle = ema.bundle.load(path)
     if bundle.manifest.get("builder_hash") != digest(builder):
