@@ -11,6 +11,7 @@ import numpy as np
 from ema import faults
 from ema.core.errors import ConfigError
 from ema.effects import registry
+from ema.effects.trapezoid import sector, six_step
 
 from .actuator import Actuator
 from .envelope import envelope
@@ -99,12 +100,26 @@ def cold_start(plant: Actuator, n: int) -> np.ndarray:
     return state
 
 
-def start_at(plant: Actuator, theta_u: np.ndarray, theta_m: np.ndarray) -> np.ndarray:
-    """State at rest at a measured user position and rotor angle (n,), shape (n, N_STATE)."""
+def start_at(
+    plant: Actuator, theta_u: np.ndarray, theta_m: np.ndarray, theta_cmd: float | np.ndarray = 0.0
+) -> np.ndarray:
+    """State at rest at a measured user position and rotor angle (n,), shape (n, N_STATE).
+
+    Held by stiction off its command, the motor carries the current that the controller asks for in vain, unless that is
+    within the comparators' band: then it has died away.
+    """
     theta_u, theta_m = np.atleast_1d(theta_u), np.atleast_1d(theta_m)
     state = cold_start(plant, len(theta_u))
     state[:, STATE.index("theta_u")] = theta_u
     state[:, STATE.index("theta_m")] = theta_m
+    I_max = plant.inverter.I_max
+    I_ref = np.clip(plant.control.K_w * plant.control.K_p * (theta_cmd - theta_u), -I_max, I_max)
+    n = [sector(plant.motor.p * angle + plant.motor.theta_0) for angle in theta_m]
+    for phase, turned in (("a", 0.0), ("b", -2.0), ("c", 2.0)):
+        i = np.where(np.abs(I_ref) > plant.inverter.h, I_ref, 0.0) * [six_step(n_j + turned) for n_j in n]
+        for name in (f"i_{phase}", f"lag1_{phase}", f"lag2_{phase}"):
+            state[:, STATE.index(name)] = i
+    state[:, STATE.index("I_ref")] = I_ref
     return state
 
 

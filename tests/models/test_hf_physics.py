@@ -185,3 +185,13 @@ def test_lanes_and_single_run_agree():
     for j in (0, 7, 15):
         alone = hf.simulate(PLANT, k[j], PLANT.command()[:300], noise=False)
         assert np.abs(alone.i[0] - batch.i[j]).max() < 1e-9
+
+
+@pytest.mark.parametrize("offset", [-9.2e-5, 6e-5, 9.2e-5])
+def test_a_start_off_the_command_is_at_rest_with_its_holding_current(offset):
+    """Stiction holds; what the recorder reads at first is what it reads when the start is forgotten."""
+    start = hf.start_at(PLANT, np.array([offset]), np.array([offset * PLANT.transmission.GR]))
+    r = hf.simulate(PLANT, np.zeros(6), np.zeros(600), start=start)
+    assert np.ptp(r.theta_m) < PLANT.transmission.GR * PLANT.sensors.lvdt_step  # ripple may make it creep
+    x = 0.5 * np.abs(r.i[0]).sum(axis=0)
+    assert x[:30].mean() == pytest.approx(x[300:].mean(), abs=0.08)
