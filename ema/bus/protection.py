@@ -21,6 +21,7 @@ _ROW = FRAME_DTYPE.itemsize
 _DATA = FRAME_DTYPE.fields["data"][1]  # type: ignore[index]
 _FORMAT = int(FrameFlag.EXTENDED | FrameFlag.FD)
 _FORMAT_MASK = _FORMAT | int(FrameFlag.REMOTE | FrameFlag.ERROR)
+RESTART_NS = 500_000_000  # an actuator that is on is heard ten times a second
 
 
 class Sender:
@@ -106,6 +107,8 @@ class Receiver:
                 stream.counts.n_good += 1
                 stream.last_ns = t_ns
             else:
+                if t_ns - self._last_heard(frame_id) > RESTART_NS:
+                    self._begin_anew(frame_id)
                 check = checks[n] = stream.place(number, t_ns)
                 if check <= GOOD:
                     stream.last_ns = t_ns
@@ -119,6 +122,22 @@ class Receiver:
     def counts(self) -> Counts:
         """What happened, over all streams."""
         return sum((stream.counts for stream in self.streams.values()), Counts(n_foreign=self._n_foreign))
+
+    def _siblings(self, frame_id: int) -> list[Stream]:
+        number = identifiers.actuator(frame_id)
+        return [s for other, s in self.streams.items() if s.expected >= 0 and identifiers.actuator(other) == number]
+
+    def _last_heard(self, frame_id: int) -> int:
+        """When the last good frame of the same actuator came. [ns]"""
+        return max((stream.last_ns for stream in self._siblings(frame_id)), default=0)
+
+    def _begin_anew(self, frame_id: int) -> None:
+        """After a long silence an actuator may have been restarted, and then counts from its beginning.
+
+        Its rare frames need this: CycleStart a few cycles after a restart looks like an old one sent again.
+        """
+        for stream in self._siblings(frame_id):
+            stream.expected = -1
 
     def _open(self, frame_id: int) -> Stream | None:
         message = self._codec.find(frame_id)

@@ -206,3 +206,31 @@ def test_arbitrary_frames_never_break_the_receiver(codec, any_frames, data):
         assert checks.size == frames.size
         for message, part in codec.split(frames[checks <= GOOD]):
             message.decode(part)
+
+
+def test_an_actuator_that_was_restarted_is_followed_at_once(codec):
+    """Its rare frames as well: their numbers are only a little behind, as if old ones were sent again."""
+    receiver = Receiver(codec, actuators={3})
+
+    def flight(start_ns):
+        sender, second = Sender(), 1_000_000_000
+        cycles = [
+            codec.encode(name, 3, values, start_ns + n * second + delay)
+            for n in range(4)
+            for name, values, delay in (
+                ("CycleStart", SPAN, 0),
+                ("Supply", {"u_dc": 48.0, "temp_w": 20.0}, 1000),
+                ("CycleEnd", SPAN, 400_000_000),
+                ("Supply", {"u_dc": 48.0, "temp_w": 20.0}, 800_000_000),
+            )
+        ]
+        return sender.protect(np.concatenate(cycles))
+
+    first, second = flight(0), flight(5_000_000_000)
+    assert (receiver.check(first) == Check.OK).all()
+    assert (receiver.check(first[-4:]) == Check.REPEATED).all()  # without a silence they are old ones
+    assert (receiver.check(second) <= GOOD).all()
+    assert receiver.counts.n_lost == 0
+
+
+SPAN = {"cycle": 1, "first_current": 0, "first_motion": 0, "n_samples": 5001, "period": 1e-4, "motion_kind": 0}

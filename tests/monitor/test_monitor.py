@@ -207,3 +207,13 @@ def test_a_large_fault_is_not_taken_for_a_wrong_model(bench, fly):
     asked = [o for o in outputs if isinstance(o, Identified) and o.estimate.method == "lf2"]
     assert len(asked) > 3
     assert np.median([o.estimate.k[2] for o in asked]) == pytest.approx(0.2, abs=0.03)
+
+
+def test_an_actuator_that_was_restarted_is_monitored_from_its_first_cycle(bench, fly, growing):
+    frames = np.concatenate([f for _, f in fly(**growing)])
+    again = frames.copy()
+    again["t_ns"] += np.uint64(8_000_000_000)
+    outputs = bench.outputs(np.concatenate([frames, again]))
+    assert [(a.cycle, a.estimate.status) for a in linear(outputs)] == [(n, Status.VALID) for n in [*range(6)] * 2]
+    (event,) = [o for o in outputs if isinstance(o, Event)]
+    assert event.text == "cycle 0 follows cycle 5: the actuator has restarted"
