@@ -59,7 +59,7 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, as_json:
 
         findings, draw = examiner.discrepancy(plant_file, read, say)
         findings.write(out / "findings.json")
-        write_extended(plant_file, findings.effects, out / "extended.yaml")
+        write_extended(plant_file, findings.effects, out / "extended.yaml", findings.fitted)
         say("pictures")
         name = str(config.read_yaml(plant_file).get("name", plant_file.stem))
         write_report(out / "report.html", name, [str(path) for path in records], findings, draw())

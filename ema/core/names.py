@@ -41,5 +41,6 @@ CHANNELS = {
     "w_m": Channel("rad/s", "rotor speed, mechanical"),
     "w_ref": Channel("rad/s", "commanded rotor speed"),
     "q": Channel("m", "position of a linear axis"),
+    "v": Channel("m/s", "speed of a linear axis"),
     "force": Channel("N", "force on a linear axis"),
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,25 @@ from ema.core import config
 from .findings import FoundEffect
 
 
-def write_extended(plant_file: Path, effects: Iterable[FoundEffect], out: Path) -> None:
-    """Write `plant_file` with the effects' values; their intervals stand in comments at the top."""
+def write_extended(
+    plant_file: Path, effects: Iterable[FoundEffect], out: Path, fitted: Mapping[str, Any] | None = None
+) -> None:
+    """Write `plant_file` with the effects' values; their intervals stand in comments at the top.
+
+    An effect found more than once (cogging lines) gets a number: ``cogging#2``. `fitted` replaces further keys.
+    """
     data: dict[str, Any] = config.read_yaml(plant_file)
     declared: dict[str, dict[str, float]] = dict(data.get("effects") or {})
     comments = [f"# {plant_file.name} with what `ema discrepancy` found in measured records."]
+    written: set[str] = set()
     for effect in effects:
-        declared[effect.name] = {
-            **declared.get(effect.name, {}),
+        key, number = effect.name, 1
+        while key in written or (effect.name == "cogging" and key in declared):
+            number += 1
+            key = f"{effect.name}#{number}"
+        written.add(key)
+        declared[key] = {
+            **declared.get(key, {}),
             **{name: float(f"{q.value:.6g}") for name, q in effect.parameters.items()},
         }
         comments.append(f"# {effect.sentence}")
@@ -31,5 +42,6 @@ def write_extended(plant_file: Path, effects: Iterable[FoundEffect], out: Path) 
         if effect.indistinguishable_from:
             comments.append(f"#   or {', '.join(effect.indistinguishable_from)}; told apart by {effect.separated_by}")
     data["effects"] = declared
+    data |= fitted or {}
     text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
     out.write_text("\n".join(comments) + "\n" + text, encoding="utf-8")

@@ -43,6 +43,10 @@ class Gain:
     k_after: tuple[float, ...] = ()
     false_alarms_before: int = 0
     false_alarms_after: int = 0
+    k_names: tuple[str, ...] = ()  # where they are not the faults k1…k6
+    what: str = "error of the simulated envelope"
+    scale: float = 1e3
+    unit: str = "mA"
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,10 @@ class Findings:
     ----------
     notes : list of str
         What a reader must know to judge the answer: what was not measured, what was close.
+    records : list of dict
+        Held-out errors by record, where records differ in kind.
+    fitted : dict
+        Values that replace those of the plant file beside the effects.
     """
 
     verdict: Literal["adequate", "explained", "unexplained"]
@@ -61,6 +69,8 @@ class Findings:
     structure: dict[str, Any] = field(default_factory=dict)
     tried: list[dict[str, Any]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    records: list[dict[str, Any]] = field(default_factory=list)
+    fitted: dict[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """The content of findings.json."""
@@ -76,6 +86,7 @@ class Findings:
                     "err_after": g.heldout_after,
                     "noise_floor": g.noise_floor,
                 },
+                **({"k_names": list(g.k_names)} if g.k_names else {}),
                 "k_before": list(g.k_before),
                 "k_after": list(g.k_after),
                 "false_alarms_before": g.false_alarms_before,
@@ -83,6 +94,7 @@ class Findings:
             },
             "tried": self.tried,
             "notes": self.notes,
+            **({"records": self.records} if self.records else {}),
         }
 
     def write(self, path: Path) -> None:

@@ -10,5 +10,5 @@ EFFECT = Effect(
     sentence="the recorder's clock is off by {rate:+.2g}",
     separated_by="a record with an external time mark",
     mistaken_for=("k1", "k2"),
-    plants=("ema",),
+    plants=("ema", "axis"),
 )

@@ -10,5 +10,5 @@ EFFECT = Effect(
     sentence="the position reaches the controller {time:.2g} s late",
     separated_by="a step or fast chirp with the motor angle recorded",
     mistaken_for=("k1", "k3", "k4", "k5"),
-    plants=("ema",),
+    plants=("ema", "axis"),
 )

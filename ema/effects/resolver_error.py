@@ -25,5 +25,5 @@ EFFECT = Effect(
     separated_by="constant speed over many turns",
     laws={"angle_error": error},
     mistaken_for=("k6",),
-    plants=("ema",),
+    plants=("ema", "axis"),
 )

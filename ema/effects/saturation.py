@@ -26,5 +26,5 @@ EFFECT = Effect(
     separated_by="motions with high and low acceleration",
     laws={"emf_factor": emf_factor, "inductance_factor": inductance_factor},
     mistaken_for=("k3", "k4", "k5"),
-    plants=("ema",),
+    plants=("ema", "axis"),
 )

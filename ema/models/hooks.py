@@ -53,8 +53,8 @@ def _combine(how: str, head: Any, tail: Any) -> Any:
     return total if how == "sum" else product
 
 
-def combined(hook: str) -> Any:
-    """The laws of all effects at `hook` as one jitted function; neutral where there is none."""
+def combined(hook: str, plant: str = "ema", row: Callable[[str], int] = row) -> Any:
+    """The laws of all effects of `plant` at `hook` as one jitted function; neutral where there is none."""
     how, _ = HOOKS[hook]
     neutral = 0.0 if how == "sum" else 1.0
 
@@ -63,7 +63,7 @@ def combined(hook: str) -> Any:
         return neutral
 
     for name, effect in registry().items():
-        if hook in effect.laws and "ema" in effect.plants:
+        if hook in effect.laws and plant in effect.plants:
             first = row(f"{name}.{effect.parameters[0].name}")
             function = _combine(how, _bind(effect.laws[hook], first, len(effect.parameters)), function)
     return function

@@ -1,0 +1,39 @@
+"""The axis plant for the discrepancy engine: one inertia or mass with its records.
+
+==============  =====================================================================================
+`channels`      which channels of the record are drive, outputs, angle; what is missing is said
+`noise`         rms of each channel's noise: declared in the plant file, or estimated from the record
+`windows`       records cut into parts that are simulated on their own, with their start states
+`whitening`     free-run residuals → independent standard normal numbers, by the noise's own dynamics
+`weak_form`     torque residual along the measured motion, integrated against test functions
+`candidates`    library effects scaled to this axis, with starts
+`cogging`       the order scan
+`structure`     terms suggested by the torque residual when no effect explains it
+`plant`         all of it as the engine's `Plant`
+==============  =====================================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from ema.core.records import Record
+from ema.discrepancy.findings import Findings
+from ema.discrepancy.report import Picture
+
+
+def discrepancy(
+    plant_file: Path, records: Sequence[Record], say: Callable[[str], None]
+) -> tuple[Findings, Callable[[], list[Picture]]]:
+    """Findings on records of the axis in `plant_file`, and what draws their pictures."""
+    from ema.discrepancy.examine import examine
+    from ema.models import axis_config
+
+    from .pictures import pictures
+    from .plant import AxisPlant
+    from .wording import findings
+
+    plant = AxisPlant(axis_config.load(plant_file), records)
+    outcome = examine(plant, say)
+    return findings(plant, outcome), lambda: pictures(plant, outcome)

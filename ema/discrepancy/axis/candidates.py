@@ -1,0 +1,243 @@
+"""Library effects as candidates: bounds and starts from the sizes of torque, speed and position in the records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ema.discrepancy.plant import Candidate, Free, Point
+from ema.effects import registry
+from ema.models.axis_config import LinearAxis
+
+from .cogging import cogging_candidate
+
+if TYPE_CHECKING:
+    from .plant import AxisPlant
+
+PRIOR = 0.5  # standard deviation of a fitted parameter about the plant file's value, relative
+BASE_RANGE = 20.0  # a fitted parameter stays within this factor of the plant file's value
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Typical sizes in the records: rms of drive torque, speed, drive, voltage; extent of position; sample period."""
+
+    torque: float
+    speed: float
+    drive: float
+    current: float
+    voltage: float
+    centre: float
+    half_range: float
+    period: float
+
+
+def sizes(plant: AxisPlant) -> Sizes:
+    """Sizes over all records; the largest where records differ."""
+    p = plant.plant
+    moving = [w for w in plant.windows if not w.static] or list(plant.windows)
+    drive = _rms(np.concatenate([w.drive for w in plant.windows]))
+    speed = _rms(np.concatenate([w.speed for w in moving])) or 1.0
+    k_t = float(p.k_t or 1.0)
+    current, voltage = drive, 1.0
+    if p.drive == "voltage":
+        current, voltage = drive / max(float(p.R or 1.0), 1e-9), drive
+        for b in plant.benches:
+            if "i_q" in b.roles.outputs:
+                row = b.roles.outputs.index("i_q")
+                current = _rms(np.concatenate([w.outputs[row] for w in b.windows]))
+    elif p.drive == "speed-loop":
+        current = max(p.F_d, 1e-12) / k_t + p.inertia * speed / k_t
+    for b in plant.benches:
+        if "u_q" in b.roles.outputs and not b.static:
+            row = b.roles.outputs.index("u_q")
+            voltage = max(voltage if voltage != 1.0 else 0.0, _rms(np.concatenate([w.outputs[row] for w in b.windows])))
+    torque = drive if p.drive == "force" else k_t * current
+    position = np.concatenate([w.position for w in moving])
+    low, high = float(position.min()), float(position.max())
+    period = max((w.period for w in moving if not w.static), default=1e-3)
+    return Sizes(torque, speed, drive, current, voltage, 0.5 * (low + high), max(0.5 * (high - low), 1e-12), period)
+
+
+def _rms(x: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def base(plant: AxisPlant) -> tuple[Free, ...]:
+    """Friction level, and the parameters the plant file names under `fitted`."""
+    p, s = plant.plant, sizes(plant)
+    unit = "N" if isinstance(p, LinearAxis) else "N m"
+    free = [Free("F_d", unit, 0.0, 3.0 * s.torque, min(p.F_d, 2.9 * s.torque), 0.05 * s.torque, 1e-3 * s.torque)]
+    for name in p.fitted:
+        value = float(getattr(p, name))
+        field = type(p).model_fields[name].json_schema_extra
+        unit = str(field["unit"]) if isinstance(field, dict) else ""
+        scale = value if value > 0.0 else 0.1 * s.torque / s.speed
+        high = max(value, scale) * BASE_RANGE
+        free.append(Free(name, unit, value / BASE_RANGE, high, value, 0.05 * scale, prior=PRIOR * scale))
+    return tuple(free)
+
+
+def library(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candidate]:
+    """Every effect of the library that has a meaning for this axis and its channels."""
+    s = sizes(plant)
+    found = [c for name in registry() if (c := _candidate(plant, s, name, point)) is not None]
+    line = cogging_candidate(plant, point, blocks)
+    return found if line is None else [*found, line]
+
+
+def _candidate(plant: AxisPlant, s: Sizes, name: str, point: Point) -> Candidate | None:
+    build = _BUILDERS.get(name)
+    have = any(key.startswith(f"{name}.") for key in point)
+    if build is None or have or "axis" not in registry()[name].plants:
+        return None
+    spec = build(plant, s)
+    if spec is None:
+        return None
+    units = {p.name: p.unit for p in registry()[name].parameters}
+    nominal = {**registry()[name].neutral(), **plant.plant.effects.get(name, {})}
+    free = tuple(
+        Free(f"{name}.{parameter}", units[parameter], low, high, start[0], scale)
+        for parameter, (low, high, start, scale) in spec.items()
+    )
+    grid: list[dict[str, float]] = [{}]
+    for parameter, (_, _, starts, _) in spec.items():
+        grid = [{**point_, f"{name}.{parameter}": value} for point_ in grid for value in starts]
+    neutral = {f.name: nominal[f.name.removeprefix(f"{name}.")] for f in free[:1]}
+    return Candidate(name, name, free, tuple(grid), neutral)
+
+
+# Each builder: parameter → (low, high, starts, scale); the first parameter is the one that switches the effect off.
+_Spec = dict[str, tuple[float, float, Sequence[float], float]]
+
+
+def _has(plant: AxisPlant, channel: str) -> bool:
+    return any(channel in b.roles.outputs for b in plant.benches)
+
+
+def _rotary(plant: AxisPlant) -> bool:
+    return not isinstance(plant.plant, LinearAxis)
+
+
+def _viscous(plant: AxisPlant, s: Sizes) -> _Spec:
+    c = s.torque / s.speed
+    return {"coefficient": (-plant.plant.C, 3.0 * c, (0.05 * c,), 0.05 * c)}
+
+
+def _quadratic(plant: AxisPlant, s: Sizes) -> _Spec:
+    c = s.torque / s.speed**2
+    return {"coefficient": (0.0, 3.0 * c, (0.05 * c,), 0.05 * c)}
+
+
+def _stribeck(plant: AxisPlant, s: Sizes) -> _Spec:
+    w = s.speed
+    return {"excess": (0.0, 3.0, (0.3,), 0.1), "speed": (0.01 * w, w, (0.03 * w, 0.1 * w, 0.3 * w), 0.05 * w)}
+
+
+def _position_friction(plant: AxisPlant, s: Sizes) -> _Spec:
+    x, h = s.centre, s.half_range
+    centres = [x + f * h for f in (-0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75)]
+    return {
+        "height": (-0.95, 10.0, (0.5,), 0.1),
+        "centre": (x - h, x + h, centres, 0.1 * h),
+        "width": (0.02 * h, h, (0.1 * h, 0.3 * h), 0.05 * h),
+    }
+
+
+def _spring(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    k = s.torque / s.half_range
+    return {"stiffness": (-5.0 * k, 5.0 * k, (0.05 * k,), 0.05 * k)}
+
+
+def _flux(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    if plant.plant.drive == "force":
+        return None
+    spec: _Spec = {"change": (-0.4, 0.4, (-0.02,), 0.02)}
+    dT = [w.dT for w in plant.windows]
+    if np.ptp(dT) > 5.0:
+        spec["per_kelvin"] = (-0.004, 0.002, (-0.001,), 0.0005)
+    return spec
+
+
+def _resistance(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    if not (_has(plant, "u_q") or plant.plant.drive == "voltage") or "R" in plant.plant.fitted:
+        return None
+    spec: _Spec = {"change": (-0.6, 2.0, (0.05,), 0.05)}
+    if np.ptp([w.dT for w in plant.windows]) > 5.0:
+        spec["per_kelvin"] = (0.0, 0.008, (0.0039,), 0.001)
+    return spec
+
+
+def _drop(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    if not (_has(plant, "u_q") or plant.plant.drive == "voltage"):
+        return None
+    return {"voltage": (0.0, 0.5 * s.voltage, (0.02 * s.voltage,), 0.01 * s.voltage)}
+
+
+def _saturation(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    if plant.plant.drive == "force":
+        return None
+    return {"emf": (0.0, 0.3 / s.current**2, (0.03 / s.current**2,), 0.02 / s.current**2)}
+
+
+def _resolver(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    if not _rotary(plant):
+        return None
+    parts = ("once_cosine", "once_sine", "twice_cosine", "twice_sine")
+    return {name: (-0.2, 0.2, (1e-3,), 0.01) for name in parts}
+
+
+def _speed_delay(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    if not (_has(plant, "w_m") or _has(plant, "v")):
+        return None
+    return {"time": (0.0, 20.0 * s.period, (0.3 * s.period, 3.0 * s.period), 0.3 * s.period)}
+
+
+def _position_delay(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    if not (_has(plant, "theta_m") or _has(plant, "q")):
+        return None
+    return {"time": (0.0, 20.0 * s.period, (0.3 * s.period, 3.0 * s.period), 0.3 * s.period)}
+
+
+def _inertia(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    if {"J", "M"} & set(plant.plant.fitted) or all(w.static for w in plant.windows):
+        return None
+    return {"change": (-0.8, 4.0, (0.02,), 0.03)}
+
+
+def _drive_gain(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    return None if plant.plant.drive == "speed-loop" else {"gain": (-0.5, 1.0, (0.02,), 0.02)}
+
+
+def _drive_offset(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    if plant.plant.drive == "speed-loop":
+        return None
+    return {"offset": (-3.0 * s.drive, 3.0 * s.drive, (0.02 * s.drive,), 0.02 * s.drive)}
+
+
+_BUILDERS: dict[str, Callable[[AxisPlant, Sizes], _Spec | None]] = {
+    "viscous_drag": _viscous,
+    "quadratic_drag": _quadratic,
+    "stribeck": _stribeck,
+    "asymmetric_friction": lambda plant, s: {"asymmetry": (-0.95, 0.95, (0.1,), 0.05)},
+    "position_friction": _position_friction,
+    "load_friction": lambda plant, s: {"per_torque": (0.0, 20.0 / s.torque, (0.2 / s.torque,), 0.1 / s.torque)},
+    "constant_load": lambda plant, s: {
+        "torque": (-3.0 * s.torque, 3.0 * s.torque, (0.02 * s.torque,), 0.02 * s.torque)
+    },
+    "spring_load": _spring,
+    "magnet_flux": _flux,
+    "winding_resistance": _resistance,
+    "inverter_drop": _drop,
+    "saturation": _saturation,
+    "resolver_error": _resolver,
+    "speed_delay": _speed_delay,
+    "position_delay": _position_delay,
+    "clock_skew": lambda plant, s: {"rate": (-0.05, 0.05, (0.002,), 0.002)},
+    "inertia": _inertia,
+    "drive_gain": _drive_gain,
+    "drive_offset": _drive_offset,
+}

@@ -1,0 +1,150 @@
+"""Cogging: which orders per turn the torque residual shows, and how strongly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import stats
+
+from ema.core.records import Array
+from ema.discrepancy.plant import Candidate, Free, Point
+from ema.models.axis_config import LinearAxis
+
+from .naming import line
+from .weak_form import Weak, weak_form
+from .windows import Bench
+
+if TYPE_CHECKING:
+    from .plant import AxisPlant
+
+MAX_ORDER = 240
+MAX_LINES = 8
+MAX_ROWS = 5000
+N_GROWTHS = 3.0  # growth of e^3 in a window
+LONGEST_WINDOW = 0.4  # [s]
+ALARM = 1e-4  # of a line that is not there, over all orders
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Result of a scan over orders: lines found, in the order found, with cosine and sine parts [N m];
+    `inertia` is what the same regression says of the inertia to be added. [kg m²]
+    """
+
+    orders: tuple[float, ...]
+    parts: Array
+    inertia: float = 0.0
+
+
+def scan(weak: Weak, orders: Array, max_lines: int = MAX_LINES, alarm: float = ALARM) -> Scan:
+    """Forward orthogonal selection of angle-locked lines beside friction, viscous drag, inertia and a constant."""
+    y = weak.y / weak.sigma
+    m = weak.motion
+    always = [np.ones(len(m.theta)), np.sign(m.direction), m.w]
+    A = np.stack([*(weak.integrate(f) / weak.sigma for f in always), weak.inertia / weak.sigma], axis=1)
+    lines = np.stack(
+        [
+            np.stack([weak.integrate(np.cos(n * m.theta)), weak.integrate(np.sin(n * m.theta))], axis=1)
+            / weak.sigma[:, None]
+            for n in orders
+        ]
+    )  # (n_orders, n_y, 2)
+    resolvable = np.sqrt((lines**2).mean(axis=(1, 2))) > 0.1 * np.sqrt(np.mean(weak.sigma**-2.0) * 0.5)
+    chosen: list[int] = []
+    basis = _orthonormal(A)
+    n_effective = max(len(y) / 4, 8)  # neighbouring test functions overlap
+    while len(chosen) < max_lines:
+        rest = y - basis @ (basis.T @ y)
+        left = lines - np.einsum("ij,kjl->kil", basis, np.einsum("ij,kil->kjl", basis, lines))
+        gain = np.array([_explained(block, rest) for block in left])
+        gain[~resolvable] = 0.0
+        gain[chosen] = 0.0
+        best = int(np.argmax(gain))
+        total = float(rest @ rest)
+        f = (gain[best] / 2.0) / max((total - gain[best]) / max(len(y) - basis.shape[1] - 2, 1), 1e-300)
+        p = stats.f.sf(f * n_effective / len(y), 2, n_effective) * int(resolvable.sum())
+        if p > alarm or gain[best] < 0.005 * total:
+            break
+        chosen.append(best)
+        basis = _orthonormal(np.concatenate([A, *lines[chosen]], axis=1))
+    if not chosen:
+        return Scan((), np.empty((0, 2)))
+    coefficients, *_ = np.linalg.lstsq(np.concatenate([A, *lines[chosen]], axis=1), y, rcond=None)
+    parts = coefficients[A.shape[1] :].reshape(-1, 2)
+    return Scan(tuple(float(orders[k]) for k in chosen), parts, float(-coefficients[A.shape[1] - 1]))
+
+
+def thinned(weak: Weak) -> Weak:
+    """At most `MAX_ROWS` test functions, evenly."""
+    if len(weak.y) <= MAX_ROWS:
+        return weak
+    return weak[np.unique(np.linspace(0, len(weak.y) - 1, MAX_ROWS).astype(int))]
+
+
+def _orthonormal(A: Array) -> Array:
+    u, s, _ = np.linalg.svd(A / np.maximum(np.linalg.norm(A, axis=0), 1e-300), full_matrices=False)
+    return np.asarray(u[:, s > 1e-8 * s[0]])
+
+
+def _explained(block: Array, rest: Array) -> float:
+    """Part of |rest|² that the two columns of a line explain."""
+    gram = block.T @ block
+    if np.linalg.cond(gram) > 1e8:
+        return 0.0
+    b = block.T @ rest
+    return float(b @ np.linalg.solve(gram, b))
+
+
+def integer_orders(weak: Weak) -> Array:
+    """Orders that the covered angle can tell from a constant."""
+    span = float(np.ptp(weak.motion.theta))
+    lowest = max(1, int(np.ceil(3.0 * np.pi / max(span, 1e-9))))
+    return np.arange(lowest, MAX_ORDER + 1, dtype=float)
+
+
+def cogging_candidate(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> Candidate | None:
+    """Lines of integer order that stand out of the torque residual, or None."""
+    if isinstance(plant.plant, LinearAxis):
+        return None
+    weak = thinned(weak_form(plant, point, blocks))
+    orders = integer_orders(weak)
+    if len(orders) == 0 or len(weak.y) < 30:
+        return None
+    taken = {float(name.split(":")[1].rpartition(".")[0]) for name in point if name.startswith("cogging:")}
+    found = scan(weak, np.array([n for n in orders if n not in taken]))
+    if not found.orders:
+        return None
+    size = float(np.abs(found.parts).max())
+    free, start = [], {}
+    for n, (c, s) in zip(found.orders, found.parts, strict=True):
+        for part, value in (("cos", c), ("sin", s)):
+            name = line(n, part)
+            free.append(Free(name, "N m", -20.0 * size, 20.0 * size, float(value), 0.1 * size, 1e-3 * size))
+            start[name] = float(value)
+    starts: list[dict[str, float]] = [start]
+    if "J" in plant.plant.fitted:
+        J = next(f for f in plant.base if f.name == "J")
+        starts.append({**start, "J": min(max(float(point["J"]) + found.inertia, J.low), J.high)})
+    return Candidate("cogging", "cogging", tuple(free), tuple(starts), dict.fromkeys(start, 0.0))
+
+
+def predictable(plant: AxisPlant, bench: Bench) -> float:
+    """Length of time over which the motion of a record can be foretold from a start state. [s]
+
+    An angle-locked torque A sin nθ makes deviations grow like exp(λ t), λ² = A n / J; after a few of these the
+    start state's noise decides.
+    """
+    moving = [j for j, w in enumerate(plant.windows) if w.group == bench.name and not w.static]
+    if isinstance(plant.plant, LinearAxis) or not moving:
+        return LONGEST_WINDOW
+    weak = thinned(weak_form(plant, {}, moving))
+    orders = integer_orders(weak)
+    if len(orders) == 0 or len(weak.y) < 30:
+        return LONGEST_WINDOW
+    found = scan(weak, orders, max_lines=2)
+    stiffness = max((float(np.hypot(*p)) * n for n, p in zip(found.orders, found.parts, strict=True)), default=0.0)
+    growth = np.sqrt(stiffness / plant.plant.inertia)
+    return float(min(LONGEST_WINDOW, N_GROWTHS / growth)) if growth > 0.0 else LONGEST_WINDOW

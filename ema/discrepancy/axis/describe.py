@@ -1,0 +1,103 @@
+"""Found effects in an engineer's words and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ema.discrepancy.plant import Candidate, Point
+from ema.effects import registry
+from ema.models.axis_config import LinearAxis
+
+from .naming import numbers_of
+
+if TYPE_CHECKING:
+    from .plant import AxisPlant
+
+INTERVAL = (2.5, 97.5)  # percent
+
+
+def effects(plant: AxisPlant, found: Sequence[Candidate], point: Point, drawn: Sequence[Point]) -> list[dict[str, Any]]:
+    """One entry per effect (one per cogging line): name, sentence, parameters with intervals."""
+    own = numbers_of(point)
+    samples = [numbers_of(p) for p in drawn]
+    out = []
+    for candidate in found:
+        if candidate.is_structure:
+            continue
+        effect = registry()[candidate.effect]
+        names = {f.name for f in candidate.free}
+        mine = numbers_of({name: value for name, value in point.items() if name in names})
+        for values in mine.effects.values():
+            key = _key(own.effects, values)
+            unit = {p.name: p.unit for p in effect.parameters}
+            parameters = {}
+            for name, value in values.items():
+                spread = np.array([s.effects[key][name] for s in samples if key in s.effects])
+                if name == "phase" and spread.size:
+                    spread = value + np.angle(np.exp(1j * (spread - value)))
+                low, high = np.percentile(spread, INTERVAL) if spread.size else (value, value)
+                parameters[name] = {"value": value, "low": float(low), "high": float(high), "unit": unit[name]}
+            full = {**effect.neutral(), **values}
+            out.append(
+                {
+                    "key": candidate.key,
+                    "name": effect.name,
+                    "sentence": effect.sentence.format(**full),
+                    "separated_by": effect.separated_by,
+                    "mistaken_for": list(effect.mistaken_for),
+                    "parameters": parameters,
+                }
+            )
+    return out
+
+
+def _key(effects_: dict[str, dict[str, float]], values: dict[str, float]) -> str:
+    return next(key for key, other in effects_.items() if other == values)
+
+
+def structure(plant: AxisPlant, terms: Sequence[Candidate], point: Point) -> dict[str, Any]:
+    """What the unnamed terms look like."""
+    out: dict[str, Any] = {"terms": [], "orders": [], "frequencies": [], "depends_on": []}
+    unit = "N" if isinstance(plant.plant, LinearAxis) else "N m"
+    for candidate in terms:
+        key = candidate.free[0].name.split(".")[0]
+        values = {name.removeprefix(f"{key}."): v for name, v in point.items() if name.startswith(f"{key}.")}
+        sentence, depends = _sentence(candidate.effect, values, unit)
+        out["terms"].append({"family": candidate.effect, "sentence": sentence, "values": values})
+        out["depends_on"] += [d for d in depends if d not in out["depends_on"]]
+        if values["order"]:
+            out["orders"].append(values["order"])
+        if values["frequency"]:
+            out["frequencies"].append(values["frequency"])
+    return out
+
+
+def _sentence(family: str, v: dict[str, float], unit: str) -> tuple[str, list[str]]:
+    size = abs(v["coefficient"])
+    what = "friction" if v["is_friction"] else "torque" if unit == "N m" else "force"
+    if v["order"]:
+        times = " per ampere" if v["current_power"] else ""
+        nature = "" if abs(v["order"] - round(v["order"])) < 0.02 else ", no whole number: no part of the motor itself"
+        return (
+            f"{what} varies by {size:.3g} {unit}{times} with {v['order']:.4g} periods per turn{nature}",
+            ["angle", *(["current"] if v["current_power"] else [])],
+        )
+    if v["frequency"]:
+        return f"{what} of {size:.3g} {unit} swings with {v['frequency']:.4g} Hz in time", ["time"]
+    if v["angle_width"]:
+        return (
+            f"{what} changes by {v['coefficient']:+.3g} {unit} around position {v['angle_centre']:.4g}, "
+            f"half width {v['angle_width']:.2g}",
+            ["angle", *(["sign of speed"] if v["is_friction"] else [])],
+        )
+    if v["time_width"]:
+        return (
+            f"{what} changes by {v['coefficient']:+.3g} {unit} around t = {v['time_centre']:.4g} s of a cycle, "
+            f"half width {v['time_width']:.2g} s: intermittent",
+            ["time", *(["sign of speed"] if v["is_friction"] else [])],
+        )
+    depends = [name for name, power in (("speed", v["speed_power"]), ("current", v["current_power"])) if power]
+    return f"a {what} {family}, coefficient {v['coefficient']:.3g}", depends

@@ -1,0 +1,66 @@
+"""Names of free parameters and what they mean to the axis model.
+
+==========================  ===============================================================
+``F_d``, ``J``, ``k_t`` …   a parameter of the plant file
+``stribeck.speed``          a parameter of a library effect
+``cogging:72.cos``          cosine (sine) part of the cogging line of 72 periods per turn
+``term1.coefficient``       a column of an unnamed term (`ema.effects.torque_term`)
+``zero:NAME``               angle to be added to the positions of record NAME
+==========================  ===============================================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema.discrepancy.plant import Point
+from ema.models.axis_config import INSTANCE
+
+PARAMETERS = ("J", "M", "C", "F_d", "k_t", "k_e", "R", "L")
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A point, sorted."""
+
+    parameters: dict[str, float]
+    effects: dict[str, dict[str, float]]
+    terms: list[dict[str, float]]
+    zeros: dict[str, float]
+
+
+def line(order: float, part: str) -> str:
+    """Name of one part of a cogging line."""
+    return f"cogging:{order:g}.{part}"
+
+
+def numbers_of(point: Point) -> Numbers:
+    """Sort a point's values by what they mean."""
+    parameters: dict[str, float] = {}
+    effects: dict[str, dict[str, float]] = {}
+    terms: dict[str, dict[str, float]] = {}
+    zeros: dict[str, float] = {}
+    lines: dict[float, dict[str, float]] = {}
+    for name, value in point.items():
+        head, _, tail = name.rpartition(".")
+        if name.startswith("zero:"):
+            zeros[name.removeprefix("zero:")] = value
+        elif name.startswith("cogging:"):
+            lines.setdefault(float(head.removeprefix("cogging:")), {})[tail] = value
+        elif name.startswith("term"):
+            terms.setdefault(head, {})[tail] = value
+        elif head:
+            effects.setdefault(head, {})[tail] = value
+        else:
+            parameters[name] = value
+    for number, (order, parts) in enumerate(sorted(lines.items()), start=1):
+        key = "cogging" if number == 1 else f"cogging{INSTANCE}{number}"
+        effects[key] = cogging_line(order, parts.get("cos", 0.0), parts.get("sin", 0.0))
+    return Numbers(parameters, effects, list(terms.values()), zeros)
+
+
+def cogging_line(order: float, cos: float, sin: float) -> dict[str, float]:
+    """Amplitude and phase:  c cos nθ + s sin nθ = A sin(nθ + φ)"""
+    return {"amplitude": float(np.hypot(cos, sin)), "order": order, "phase": float(np.arctan2(cos, sin))}

@@ -1,0 +1,316 @@
+"""The axis and its records as the engine's `Plant`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ema.core.records import Array, Record
+from ema.discrepancy.plant import Block, Candidate, Errors, Free, Point
+from ema.models import axis
+from ema.models.axis_config import INSTANCE, Axis
+from ema.models.axis_layout import row
+
+from . import candidates, describe, structure
+from .cogging import LONGEST_WINDOW, predictable
+from .naming import Numbers, numbers_of
+from .noise import ESTIMATE_UNCERTAINTY
+from .whitening import Filter, design, joined, open_loop_variance
+from .windows import HALF, Bench, Window, bench
+
+TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
+RUNAWAY = 1e6  # a window that runs away counts as no worse than this
+H_MAX = 2.5e-4  # [s] longest step of the simulation, unless the record's own period is longer than ten of them
+START_NOISE = 1.5 / np.sqrt(2 * HALF + 1)  # of a smoothed start state, per noise of one sample
+
+
+class AxisPlant:
+    """One axis with its records, cut into windows.
+
+    Parameters
+    ----------
+    plant : Axis
+    records : sequence of Record
+    n_threads : int, optional
+        Threads for batches of points; the result does not depend on it.
+    """
+
+    def __init__(self, plant: Axis, records: Sequence[Record], n_threads: int | None = None):
+        self.plant = plant
+        names = _distinct([r.source.stem if r.source else f"record {k + 1}" for k, r in enumerate(records)])
+        self.n_threads = n_threads or min(os.cpu_count() or 1, 8)
+        length = plant.window or LONGEST_WINDOW
+        self._take([bench(plant, record, name, length) for record, name in zip(records, names, strict=True)])
+        if plant.window is None:
+            lengths = [predictable(self, b) for b in self.benches]
+            self._take([bench(plant, *parts) for parts in zip(records, names, lengths, strict=True)])
+
+    def _take(self, benches: Sequence[Bench]) -> None:
+        self.benches = tuple(benches)
+        self.windows: tuple[Window, ...] = tuple(w for b in benches for w in b.windows)
+        self._bench_of = [b for b in benches for _ in b.windows]
+        pairs = zip(self._bench_of, self.windows, strict=True)
+        self.filters = [None if w.static else self._filter(b, w) for b, w in pairs]
+        self._packs: dict[tuple[int, ...], list[_Pack]] = {}
+
+    # ---- the engine's view -------------------------------------------------------------------------------------
+
+    @cached_property
+    def base(self) -> tuple[Free, ...]:
+        """Friction, and what the plant file says is to be fitted."""
+        return candidates.base(self)
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """The windows."""
+        return tuple(Block(w.label, w.group, w.n, w.stretch) for w in self.windows)
+
+    @property
+    def noise_uncertainty(self) -> float:
+        """Zero where the plant file declares the noise of every channel that is compared."""
+        declared = all(noise.declared for b in self.benches for noise in b.noise.values())
+        return 0.0 if declared else ESTIMATE_UNCERTAINTY
+
+    def residuals(self, points: Sequence[Point], blocks: Sequence[int]) -> list[list[Array]]:
+        """Whitened residuals, clipped where a window runs away."""
+        return self._map(lambda point: self.whitened(point, blocks), points)
+
+    def candidates(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
+        """Library effects with bounds and starts for this axis."""
+        return candidates.library(self, point, blocks)
+
+    def structure(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
+        """Terms that the torque residual along the measured motion suggests."""
+        return structure.search(self, point, blocks)
+
+    def errors(self, point: Point, blocks: Sequence[int]) -> Errors:
+        """Free-run error of the main output over its rms about the window's mean, pooled over records."""
+        squares: dict[str, list[tuple[float, float, float, int]]] = {}
+        for j, r in zip(blocks, self.free_run(point, blocks), strict=True):
+            main = self.main_row(j)
+            y = self.windows[j].outputs[main]
+            is_position = not self.windows[j].static and self._bench_of[j].roles.speed is None
+            power = float(np.var(y)) if is_position else float(np.mean(y**2))
+            squares.setdefault(self.windows[j].group, []).append(
+                (float(np.mean(r[main] ** 2)), float(np.mean(self._floor(j)[main])), power, len(y))
+            )
+        shares = []
+        for parts in squares.values():
+            error, floor, power, n = np.array(parts).T
+            shares.append((error @ n / (power @ n), floor @ n / (power @ n)))
+        error, floor = np.sqrt(np.mean(shares, axis=0))
+        return Errors(float(error), float(floor))
+
+    def describe(
+        self, found: Sequence[Candidate], point: Point, draw: Callable[[int], Sequence[Point]]
+    ) -> list[dict[str, Any]]:
+        """Names, sentences and parameters of what was found."""
+        return describe.effects(self, found, point, draw(400))
+
+    def describe_structure(self, terms: Sequence[Candidate], point: Point) -> dict[str, Any]:
+        """Unnamed terms in words and numbers."""
+        return describe.structure(self, terms, point)
+
+    # ---- simulation --------------------------------------------------------------------------------------------
+
+    def numbers(self, point: Point) -> Numbers:
+        """What the point means to the model."""
+        return numbers_of(point)
+
+    def model(self, point: Point) -> axis.Model:
+        """The kernel's numbers at a point."""
+        n = numbers_of(point)
+        have = sum(key.split(INSTANCE)[0] == "cogging" for key in self.plant.effects)
+        effects = {_shifted(key, have): values for key, values in n.effects.items()}
+        return axis.model(self.plant, effects, n.terms, **n.parameters)
+
+    def simulate(self, point: Point, blocks: Sequence[int]) -> list[Array]:
+        """Outputs of each block as its record has them, shape (n_channels, n_times)."""
+        model, zeros = self.model(point), numbers_of(point).zeros
+        result: dict[int, Array] = {}
+        for pack in self._pack(tuple(blocks)):
+            result |= pack.split(self._simulate(pack, model, zeros))
+        return [result[j] for j in blocks]
+
+    def _simulate(self, pack: _Pack, model: axis.Model, zeros: Mapping[str, float]) -> Array:
+        zero = zeros.get(pack.bench.name, 0.0)
+        if pack.direction is not None:
+            return axis.holding(model, pack.position + zero, pack.direction, pack.t)[None, :]
+        starts = self._starts(pack, model)
+        starts[:, 0] += zero
+        drive = pack.bench.roles.kind
+        out = axis.simulate(model, drive, pack.offsets, pack.t, pack.drive, starts, self._step(pack), pack.dT)
+        out[0] -= zero
+        return out[[_KERNEL_ROW[name] for name in pack.bench.roles.outputs]]
+
+    def free_run(self, point: Point, blocks: Sequence[int]) -> list[Array]:
+        """Record less simulation, shape (n_channels, n_times) by block."""
+        simulated = self.simulate(point, blocks)
+        return [self.windows[j].outputs - y for j, y in zip(blocks, simulated, strict=True)]
+
+    def whitened(self, point: Point, blocks: Sequence[int]) -> list[Array]:
+        """Whitened residual of each block."""
+        model, zeros = self.model(point), numbers_of(point).zeros
+        result: dict[int, Array] = {}
+        for pack in self._pack(tuple(blocks)):
+            r = pack.outputs - self._simulate(pack, model, zeros)
+            r = np.clip(np.nan_to_num(r, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
+            white = r / pack.bench.noise[pack.bench.roles.drive].sigma if pack.filter is None else pack.filter.whiten(r)
+            result |= pack.split(np.clip(white, -RUNAWAY, RUNAWAY))
+        return [result[j] for j in blocks]
+
+    # ---- helpers -----------------------------------------------------------------------------------------------
+
+    def bench_of(self, block: int) -> Bench:
+        """The record a block belongs to."""
+        return self._bench_of[block]
+
+    def _map(self, f: Callable[[Point], list[Array]], points: Sequence[Point]) -> list[list[Array]]:
+        if self.n_threads > 1 and len(points) > 1:
+            with ThreadPoolExecutor(self.n_threads) as pool:
+                return list(pool.map(f, points))
+        return [f(point) for point in points]
+
+    def _pack(self, blocks: tuple[int, ...]) -> list[_Pack]:
+        if blocks not in self._packs:
+            by_bench: dict[str, list[int]] = {}
+            for j in blocks:
+                by_bench.setdefault(self.windows[j].group, []).append(j)
+            self._packs[blocks] = [
+                _Pack(
+                    self._bench_of[indices[0]],
+                    indices,
+                    [self.windows[j] for j in indices],
+                    [f for j in indices if (f := self.filters[j]) is not None],
+                )
+                for indices in by_bench.values()
+            ]
+        return self._packs[blocks]
+
+    def _step(self, pack: _Pack) -> float:
+        period = pack.windows[0].period
+        return max(period / 10.0, min(period, H_MAX))
+
+    def _starts(self, pack: _Pack, model: axis.Model) -> Array:
+        """True start states: the smoothed measurement, undone for what the model's sensors do."""
+        z = model.z
+        starts = np.empty((len(pack.windows), 2))
+        late_theta, late_w = z[row("position_delay.time")], z[row("speed_delay.time")]
+        if pack.bench.roles.speed is None:
+            late_w = late_theta
+        for place, w in enumerate(pack.windows):
+            starts[place, 0] = np.interp(w.t[0] + late_theta, w.t, w.position)
+            starts[place, 1] = np.interp(w.t[0] + late_w, w.t, w.speed)
+        return axis.true_state(model, starts)
+
+    def _filter(self, b: Bench, w: Window) -> Filter:
+        H, noise, process, damping, excursion = self._noise_model(b, w)
+        return design(H, noise, process, w.t, excursion, damping)
+
+    def _noise_model(
+        self, b: Bench, w: Window, *, turning: bool = True
+    ) -> tuple[Array, Array, Array, float, tuple[float, float]]:
+        p, kind = self.plant, b.roles.kind
+        k_t = 1.0 if kind == "force" else float(p.k_t or 1.0)
+        k_e, R, L, J = float(p.k_e or 0.0), float(p.R or 0.0), float(p.L or 0.0), p.inertia
+        acceleration = np.gradient(w.speed, w.t)
+        drive_noise = b.noise[b.roles.drive].rms(np.gradient(w.drive, w.t))
+        rows, noise = [], []
+        for place, name in enumerate(b.roles.outputs):
+            sigma = b.noise[name]
+            if name in ("theta_m", "q"):
+                rows.append((1.0, 0.0))
+                noise.append(sigma.rms(w.speed))
+            elif name in ("w_m", "v"):
+                rows.append((0.0, 1.0))
+                noise.append(sigma.rms(acceleration))
+            elif name == "u_q":
+                rows.append((0.0, k_e))
+                through = np.hypot(R, L / (np.sqrt(2.0) * w.period)) * drive_noise
+                noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
+            else:
+                rows.append((0.0, -k_e / R if kind == "voltage" else -(p.loop.K_w if p.loop else 0.0)))
+                noise.append(sigma.rms(np.gradient(w.outputs[place], w.t)))
+        gain, damping = {
+            "current": (k_t, p.C / J),
+            "force": (1.0, p.C / J),
+            "voltage": (k_t / max(R, 1e-9), (p.C + k_t * k_e / max(R, 1e-9)) / J),
+            "speed-loop": (k_t * (p.loop.K_w if p.loop else 0.0),) * 2,
+        }[kind]
+        if kind == "speed-loop":
+            damping = gain / J
+        process = gain / J * drive_noise
+        at_rest = np.abs(w.speed) < 3.0 * START_NOISE * self._speed_noise(b, w)
+        process = np.where(at_rest & np.roll(at_rest, 1) & np.roll(at_rest, -1), 0.0, process)
+        turns = np.diff(np.where(at_rest, 0.0, np.sign(w.speed)), prepend=np.sign(w.speed[0])) != 0.0
+        turns |= np.roll(turns, -1) | np.roll(turns, 1)
+        process = np.where(turns & turning, np.hypot(process, TURNING * 2.0 * float(p.F_s or p.F_d) / J), process)
+        excursion = (
+            0.1 * float(np.ptp(w.position)) + 20.0 * self._position_noise(b, w),
+            0.1 * float(np.ptp(w.speed)) + 20.0 * self._speed_noise(b, w),
+        )
+        return np.array(rows), np.array(noise), process, float(damping), excursion
+
+    def _speed_noise(self, b: Bench, w: Window) -> float:
+        if b.roles.speed is not None:
+            return b.noise[b.roles.speed].sigma
+        return b.noise[str(b.roles.position)].sigma / (HALF * w.period)
+
+    def _position_noise(self, b: Bench, w: Window) -> float:
+        if b.roles.position is not None:
+            return b.noise[b.roles.position].sigma
+        return self._speed_noise(b, w) * w.period
+
+    def main_row(self, block: int) -> int:
+        """Row of the output that is shown and whose error is reported."""
+        who = self._bench_of[block].roles
+        return who.outputs.index(who.speed) if who.speed in who.outputs and not self.windows[block].static else 0
+
+    def _floor(self, block: int) -> Array:
+        b, w = self._bench_of[block], self.windows[block]
+        if w.static:
+            return np.full((1, w.n), b.noise[b.roles.drive].sigma ** 2)
+        H, noise, process, damping, _ = self._noise_model(b, w, turning=False)
+        start = np.square([START_NOISE * self._position_noise(b, w), START_NOISE * self._speed_noise(b, w)])
+        out = np.empty(noise.shape)
+        open_loop_variance(H, noise, process, np.append(np.diff(w.t), 0.0), start, damping, out)
+        return out
+
+
+_KERNEL_ROW = {"theta_m": 0, "q": 0, "w_m": 1, "v": 1, "i_q": 2, "u_q": 3}
+
+
+class _Pack:
+    """Windows of one record, one after the other in contiguous arrays."""
+
+    def __init__(self, bench: Bench, indices: list[int], windows: list[Window], filters: list[Filter]):
+        self.bench, self.indices, self.windows = bench, indices, windows
+        self.offsets = np.concatenate(([0], np.cumsum([w.n for w in windows]))).astype(np.int64)
+        self.t = np.concatenate([w.t for w in windows])
+        self.drive = np.concatenate([w.drive for w in windows])
+        self.position = np.concatenate([w.position for w in windows])
+        self.outputs = np.concatenate([w.outputs for w in windows], axis=1)
+        self.dT = np.array([w.dT for w in windows])
+        directions = [w.direction for w in windows if w.direction is not None]
+        self.direction = np.concatenate(directions) if directions else None
+        self.filter = joined(filters) if filters else None
+
+    def split(self, rows: Array) -> dict[int, Array]:
+        """Columns of `rows` by block."""
+        edges = self.offsets.tolist()
+        return {j: rows[:, a:b] for j, a, b in zip(self.indices, edges[:-1], edges[1:], strict=True)}
+
+
+def _shifted(key: str, have: int) -> str:
+    """Key of an effect beside the cogging lines that the plant file has already."""
+    name, _, number = key.partition(INSTANCE)
+    return f"cogging{INSTANCE}{int(number or 1) + have}" if name == "cogging" and have else key
+
+
+def _distinct(names: list[str]) -> list[str]:
+    return [name if names.count(name) == 1 else f"{name} ({k + 1})" for k, name in enumerate(names)]

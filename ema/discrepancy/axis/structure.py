@@ -1,0 +1,139 @@
+"""Terms that the torque residual suggests when no effect of the library explains it.
+
+Forward selection over a dictionary of torque terms on the weak-form residual (`weak_form`); the engine then accepts a
+term only if simulations of held-out blocks improve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ema.core.records import Array
+from ema.discrepancy.plant import Candidate, Free, Point
+from ema.effects.torque_term import COLUMNS, EVEN, NEUTRAL
+
+from .candidates import Sizes, sizes
+from .cogging import thinned
+from .weak_form import Motion, Weak, weak_form
+
+if TYPE_CHECKING:
+    from .plant import AxisPlant
+
+N_GRID = 300  # members of a family at most
+N_CENTRES = 24
+N_SUGGESTIONS = 4
+MIN_GAIN = 0.01  # of the weak-form residual's power
+
+
+@dataclass(frozen=True)
+class Term:
+    """A member of a family of terms: its columns over the motion and the values of `torque_term` it stands for."""
+
+    family: str
+    columns: tuple[Array, ...]
+    values: dict[str, float]
+    refine: dict[str, tuple[float, float, float]]  # column → (low, high, scale)
+
+
+def search(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candidate]:
+    """The best member of each family, the one that explains most first."""
+    weak = thinned(weak_form(plant, point, blocks))
+    if len(weak.y) < 30:
+        return []
+    y = weak.y / weak.sigma
+    m = weak.motion
+    always = [np.ones(len(m.theta)), np.sign(m.direction), m.w]
+    columns = [*(weak.integrate(f) / weak.sigma for f in always), weak.inertia / weak.sigma]
+    q, _ = np.linalg.qr(np.stack(columns, axis=1))
+    rest = y - q @ (q.T @ y)
+    best: dict[str, tuple[float, Term, Array]] = {}
+    for term in _dictionary(m, sizes(plant)):
+        gain, coefficients = _gain(weak, term, q, rest)
+        if gain > best.get(term.family, (0.0,))[0]:
+            best[term.family] = (gain, term, coefficients)
+    power = float(rest @ rest)
+    ranked = sorted((b for b in best.values() if b[0] > MIN_GAIN * power), key=lambda b: -b[0])
+    number = 1 + len({name.split(".")[0] for name in point if name.startswith("term")})
+    return [_candidate(f"term{number}", term, c, plant) for _, term, c in ranked[:N_SUGGESTIONS]]
+
+
+def _gain(weak: Weak, term: Term, q: Array, rest: Array) -> tuple[float, Array]:
+    """Power of the residual that the term explains, and its coefficients."""
+    A = np.stack([weak.integrate(f) / weak.sigma for f in term.columns], axis=1)
+    left = A - q @ (q.T @ A)
+    if np.linalg.norm(left) < 1e-3 * np.linalg.norm(A):
+        return 0.0, np.zeros(A.shape[1])
+    coefficients, *_ = np.linalg.lstsq(left, rest, rcond=1e-6)
+    return float(rest @ (left @ coefficients)), np.asarray(coefficients)
+
+
+def _dictionary(m: Motion, s: Sizes) -> Iterator[Term]:
+    sign, one = np.sign(m.direction), np.ones(len(m.theta))
+    span = float(np.ptp(m.theta))
+    duration = float(np.ptp(m.t))
+    simple: tuple[tuple[str, Array, dict[str, float]], ...] = (
+        ("quadratic in speed", m.w * np.abs(m.w), {"speed_power": 2.0}),
+        ("proportional to current", m.i, {"current_power": 1.0}),
+        ("quadratic in current", m.i * np.abs(m.i), {"current_power": 2.0}),
+        ("even in current", np.abs(m.i), {"current_power": EVEN}),
+        ("even in speed", np.abs(m.w), {"speed_power": EVEN}),
+        ("speed times current", m.w * m.i, {"speed_power": 1.0, "current_power": 1.0}),
+    )
+    for family, f, values in simple:
+        yield Term(family, (f,), values, {})
+    if span > 0.0:
+        resolution = 2.0 * np.pi / span
+        lines: tuple[tuple[str, Array, dict[str, float]], ...] = (
+            ("angle line", one, {}),
+            ("angle line of friction", sign, {"is_friction": 1.0}),
+            ("angle line times current", m.i, {"current_power": 1.0}),
+        )
+        for family, factor, values in lines:
+            for n in np.linspace(resolution, min(resolution * N_GRID / 2, 260.0), N_GRID):
+                refine = {"order": (max(n - resolution, 0.0), n + resolution, 0.1 * resolution)}
+                columns = (factor * np.cos(n * m.theta), factor * np.sin(n * m.theta))
+                yield Term(family, columns, {**values, "order": float(n)}, refine)
+        yield from _bumps("position", m.theta, one, sign)
+    if duration > 0.0:
+        resolution = 1.0 / duration
+        for f in np.linspace(resolution, min(resolution * N_GRID / 2, 0.2 / s.period), N_GRID):
+            a = 2.0 * np.pi * f * m.t
+            refine = {"frequency": (max(f - resolution, 0.0), f + resolution, 0.1 * resolution)}
+            yield Term("time line", (np.cos(a), np.sin(a)), {"frequency": float(f)}, refine)
+        yield from _bumps("time", m.t, one, sign)
+
+
+def _bumps(what: str, x: Array, one: Array, sign: Array) -> Iterator[Term]:
+    low, high = float(x.min()), float(x.max())
+    name = "angle" if what == "position" else "time"
+    for width in (0.03, 0.08, 0.2):
+        w = width * (high - low)
+        for c in np.linspace(low, high, N_CENTRES):
+            bump = np.exp(-(((x - c) / w) ** 2))
+            refine = {f"{name}_centre": (low, high, 0.2 * w), f"{name}_width": (0.2 * w, 5.0 * w, 0.2 * w)}
+            values = {f"{name}_centre": float(c), f"{name}_width": float(w)}
+            yield Term(f"friction around a {what}", (sign * bump,), {**values, "is_friction": 1.0}, refine)
+            yield Term(f"torque around a {what}", (bump,), values, refine)
+
+
+def _candidate(key: str, term: Term, c: Array, plant: AxisPlant) -> Candidate:
+    size = float(np.abs(c).max())
+    unit = "N m"
+    start = {f"{key}.{name}": value for name, value in zip(COLUMNS, NEUTRAL, strict=True)}
+    start |= {f"{key}.{name}": value for name, value in term.values.items()}
+    free = [Free(f"{key}.coefficient", unit, -20.0 * size, 20.0 * size, 0.0, 0.1 * size, 2e-3 * size)]
+    if len(c) == 2:
+        phase_name = "angle_phase" if "order" in term.values else "time_phase"
+        start[f"{key}.coefficient"] = float(np.hypot(*c))
+        start[f"{key}.{phase_name}"] = float(np.arctan2(c[0], c[1]))
+        free.append(Free(f"{key}.{phase_name}", "rad", -10.0, 10.0, 0.0, 0.1, 1e-3))
+    else:
+        start[f"{key}.coefficient"] = float(c[0])
+    for name, (low, high, scale) in term.refine.items():
+        free.append(Free(f"{key}.{name}", "", low, high, 0.0, scale, 0.02 * scale))
+    neutral = {f"{key}.coefficient": 0.0}
+    return Candidate(term.family, term.family, tuple(free), (start,), neutral, is_structure=True)

@@ -1,0 +1,174 @@
+"""Records cut into windows that are simulated on their own, each from a start state measured there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from ema.core.errors import RecordError
+from ema.core.records import Array, Cycle, Record
+from ema.models.axis_config import Axis
+
+from .channels import MIN_SAMPLES, Roles, roles
+from .noise import Noise, estimate
+
+HALF = 5  # samples on each side of a local quadratic
+GLITCH = 12.0  # noise amplitudes by which a step of position may miss the speed before the window is cut there
+MAX_SAMPLES = 12_000  # of one record
+AMBIENT = 20.0  # [°C]
+STATIC_SAMPLES = 250
+MIN_WINDOW = 16  # samples
+STRETCH = 0.4  # [s] windows closer together are not independent enough to check one another
+
+
+@dataclass(frozen=True)
+class Window:
+    """Consecutive samples of one cycle, in arrays of shape (n_times,).
+
+    `outputs` has one row per output channel of its record. `position`, `speed` are smooth; `static` windows hold
+    samples at rest with the `direction` of approach.
+    """
+
+    group: str
+    label: str
+    t: Array
+    drive: Array
+    outputs: Array
+    position: Array
+    speed: Array
+    dT: float
+    static: bool = False
+    direction: Array | None = None
+    stretch: int = 0
+
+    @property
+    def n(self) -> int:
+        """Number of samples."""
+        return len(self.t)
+
+    @property
+    def period(self) -> float:
+        """Median time between samples. [s]"""
+        return float(np.median(np.diff(self.t)))
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Windows of one record with its channels' roles and noise."""
+
+    name: str
+    roles: Roles
+    noise: dict[str, Noise]
+    windows: tuple[Window, ...]
+    static: bool
+
+
+def bench(plant: Axis, record: Record, name: str, length: float) -> Bench:
+    """Cut one record into windows of about `length` seconds."""
+    who = roles(plant, record)
+    static = who.speed is not None and all(not cycle[who.speed].any() for cycle in record)
+    if static:  # readings at rest follow each other by number, not by time
+        numbered = tuple(Cycle(c.number, {**c.channels, "t": np.arange(float(c.n_samples))}, c.label) for c in record)
+        record = replace(record, cycles=numbered)
+    noise = {c: _noise(plant, record, c) for c in ({who.drive} if static else {who.drive, *who.outputs})}
+    if static and plant.drive != "current":
+        raise RecordError(f"{record.name}: a record at standstill needs drive: current with i_q [A]")
+    windows: list[Window] = []
+    for cycle in record:
+        if static:
+            windows += _static(name, cycle, who)
+        else:
+            windows += _moving(length, name, cycle, who, noise)
+    if not windows:
+        longest = max(cycle.n_samples for cycle in record)
+        raise RecordError(
+            f"{record.name}: too short: at least {MIN_SAMPLES} consecutive samples are needed, longest cycle {longest}"
+        )
+    return Bench(name, who, noise, _thin(windows), static)
+
+
+def _noise(plant: Axis, record: Record, name: str) -> Noise:
+    if name in plant.noise:
+        return Noise(plant.noise[name], declared=True)
+    return estimate(record.cycles, name, record.resolution.get(name))
+
+
+def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str, Noise]) -> list[Window]:
+    n = cycle.n_samples
+    if n < MIN_SAMPLES:
+        return []
+    t = cycle["t"]
+    dt = cycle.period
+    width = 2 * HALF + 1
+    if who.position is not None:
+        raw = cycle[who.position]
+        smooth = savgol_filter(raw, width, 2)
+    if who.speed is not None:
+        speed = savgol_filter(cycle[who.speed], width, 2)
+    else:
+        speed = savgol_filter(raw, 2 * width - 1, 2, deriv=1, delta=dt)
+    if who.position is None:
+        raw = smooth = np.concatenate(([0.0], np.cumsum(np.diff(t) * 0.5 * (speed[1:] + speed[:-1]))))
+    dT = float(np.mean(cycle["temp_w"])) - AMBIENT if "temp_w" in cycle else 0.0
+    cuts = _glitches(cycle, who, noise) if who.position is not None and who.speed is not None else np.array([], int)
+    gaps = np.flatnonzero(np.diff(t) > 5.0 * dt) + 1
+    edges = np.unique(np.concatenate(([0], cuts, gaps, [n])))
+    n_window = max(MIN_WINDOW, round(length / dt))
+    out = []
+    first = cycle.number * 1_000_000  # stretches of different cycles are different
+    for a, b in pairwise(edges.tolist()):
+        n_parts = max(1, round((b - a) / n_window))
+        for part in np.array_split(np.arange(a, b), n_parts):
+            if len(part) >= MIN_WINDOW:
+                rows = slice(int(part[0]), int(part[-1]) + 1)
+                outputs = np.stack([cycle[name][rows] for name in who.outputs])
+                label = f"{group}, {cycle}, {t[rows][0]:.4g} s"
+                stretch = first + int((t[rows][0] - t[0]) / max(STRETCH, length))
+                columns = (t[rows], cycle[who.drive][rows], outputs, smooth[rows], speed[rows])
+                out.append(Window(group, label, *columns, dT, stretch=stretch))
+    return out
+
+
+def _glitches(cycle: Cycle, who: Roles, noise: dict[str, Noise]) -> np.ndarray:
+    """Samples before which the position moved by another amount than speed and time say (a lost sample)."""
+    t, theta, w = cycle["t"], cycle[str(who.position)], cycle[str(who.speed)]
+    dt = np.diff(t)
+    mean = 0.5 * (w[1:] + w[:-1])
+    miss = np.diff(theta) - mean * dt
+    miss = miss - np.median(miss)
+    spread = np.hypot(1.4826 * np.median(np.abs(miss)), noise[str(who.position)].rms(mean) * np.sqrt(2.0))
+    return np.flatnonzero(np.abs(miss) > GLITCH * spread) + 1
+
+
+def _static(group: str, cycle: Cycle, who: Roles) -> list[Window]:
+    """Standstill map: each reading with the direction from which its angle was approached."""
+    if who.position is None or cycle.n_samples < MIN_SAMPLES:
+        return []
+    theta, t = cycle[who.position], cycle["t"]
+    # direction over about one hundredth of the map: readings at one angle scatter by the encoder's step
+    span = max(HALF, cycle.n_samples // 400)
+    smooth = np.convolve(np.pad(theta, span, mode="edge"), np.ones(2 * span + 1) / (2 * span + 1), mode="valid")
+    direction = np.sign(np.gradient(smooth))
+    direction[direction == 0.0] = 1.0
+    out = []
+    for k, part in enumerate(np.array_split(np.arange(len(t)), max(1, round(len(t) / STATIC_SAMPLES)))):
+        rows = slice(int(part[0]), int(part[-1]) + 1)
+        i = cycle[who.drive][rows]
+        label = f"{group}, {cycle}, {theta[rows][0]:.3g} rad"
+        columns = (t[rows], i, i[None, :], theta[rows], np.zeros(len(i)))
+        out.append(Window(group, label, *columns, 0.0, True, direction[rows], cycle.number * 1_000_000 + k))
+    return out
+
+
+def _thin(windows: list[Window]) -> tuple[Window, ...]:
+    """Evenly spread windows of a long record, so that the time of a run stays bounded."""
+    total = sum(w.n for w in windows)
+    if total <= MAX_SAMPLES:
+        return tuple(windows)
+    stretches = list(dict.fromkeys(w.stretch for w in windows))
+    keep = max(4, int(len(stretches) * MAX_SAMPLES / total))
+    kept = {stretches[j] for j in np.unique(np.linspace(0, len(stretches) - 1, keep).round().astype(int))}
+    return tuple(w for w in windows if w.stretch in kept)

@@ -1,0 +1,78 @@
+"""The engine's outcome on an axis in the form of findings.json."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from ema.discrepancy import findings as shared
+from ema.discrepancy.outcome import Outcome
+
+from .plant import AxisPlant
+
+
+def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
+    """Findings as every plant reports them."""
+    gain = shared.Gain(
+        outcome.train.err_before,
+        outcome.train.err_after,
+        outcome.heldout.err_before,
+        outcome.heldout.err_after,
+        outcome.heldout.noise_floor,
+        tuple(outcome.k_before),
+        tuple(outcome.k_after),
+        k_names=tuple(outcome.base),
+        what="error of the free run over the record's own size",
+        scale=100.0,
+        unit="%",
+    )
+    structure = dict(outcome.structure)
+    if structure:
+        structure["sentences"] = [term["sentence"] for term in structure["terms"]]
+    notes = [*outcome.notes]
+    if outcome.verdict != "adequate":
+        notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
+    notes += _kinds(plant)
+    return shared.Findings(
+        outcome.verdict,
+        [_effect(e) for e in outcome.effects],
+        gain,
+        structure,
+        outcome.tried,
+        notes,
+        [asdict(r) for r in outcome.records],
+        _fitted(plant, outcome),
+    )
+
+
+def _effect(e: dict[str, Any]) -> shared.FoundEffect:
+    parameters = {name: shared.Quantity(**q) for name, q in e["parameters"].items()}
+    others = tuple(e["indistinguishable_from"])
+    return shared.FoundEffect(e["name"], e["confidence"], others, parameters, e["sentence"], e["separated_by"])
+
+
+def _kinds(plant: AxisPlant) -> list[str]:
+    """What was taken for granted about each record."""
+    out = []
+    for b in plant.benches:
+        noise = ", ".join(
+            f"{name} {n.sigma:.2g}" + (f" and {n.jitter:.2g} s of sampling time" if n.jitter > 1e-6 else "")
+            for name, n in b.noise.items()
+            if not n.declared
+        )
+        how = "at standstill" if b.static else f"driven by {b.roles.drive} in windows of {b.windows[0].n} samples"
+        out.append(f"{b.name}: {how}" + (f"; noise estimated: {noise}" if noise else ""))
+    return out
+
+
+def _fitted(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
+    """Base parameters as fitted, and unnamed terms, for extended.yaml."""
+    point = outcome.point
+    out: dict[str, Any] = {f.name: float(f"{point[f.name]:.6g}") for f in plant.base}
+    p = plant.plant
+    if p.F_s is not None and p.F_d > 0.0:  # static friction keeps its ratio, as it did in the fit
+        out["F_s"] = float(f"{p.F_s / p.F_d * point['F_d']:.6g}")
+    terms = [term["values"] for term in outcome.structure.get("terms", [])]
+    if terms:
+        out["structure"] = [*p.structure, *({k: float(v) for k, v in t.items()} for t in terms)]
+    return out

@@ -1,0 +1,215 @@
+"""Bounded least squares of free parameters on some blocks of a plant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .plant import Array, Free, Plant, Point
+
+HUBER = 4.0  # residuals beyond this many scales count linearly: a window that diverges must not decide a fit
+WILD = 20.0  # and beyond this many they all count the same when models are compared
+RUNAWAY = 1e4
+LONGEST = 30.0  # scales of a parameter in one step
+CONVERGED = 0.02  # gain in log-likelihood of a step below which a fit has converged
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model.
+
+    Attributes
+    ----------
+    free : tuple of Free
+    point : Point
+        Values of free and fixed parameters.
+    residuals : list of arrays
+        Whitened residuals by block.
+    covariance : array, shape (n_free, n_free)
+        Of the free parameters; scaled by the residual where that is larger than noise.
+    blocks : tuple of int
+    scale : float
+        Robust scale of the residual, at least 1 (= noise).
+    """
+
+    free: tuple[Free, ...]
+    point: Point
+    residuals: list[Array]
+    covariance: Array
+    blocks: tuple[int, ...]
+    scale: float
+
+    @property
+    def loss(self) -> float:
+        """Minus the log-likelihood at the fit's own scale."""
+        return float(sum(-s.sum() for s in log_likelihood(self.residuals, self.scale)))
+
+    def draw(self, n: int, seed: int = 0) -> list[Point]:
+        """Points drawn from the fit's uncertainty, clipped to the bounds."""
+        rng = np.random.default_rng(seed)
+        names = [f.name for f in self.free]
+        mean = np.array([self.point[name] for name in names])
+        values = rng.multivariate_normal(mean, self.covariance, size=n, method="eigh")
+        values = np.clip(values, [f.low for f in self.free], [f.high for f in self.free])
+        return [{**self.point, **dict(zip(names, row.tolist(), strict=True))} for row in values]
+
+
+def scale_of(residuals: Sequence[Array]) -> float:
+    """Robust scale of whitened residuals, at least 1."""
+    r = np.concatenate([block.ravel() for block in residuals])
+    r = r[np.isfinite(r)]
+    rough = max(1.0, 1.4826 * float(np.median(np.abs(r))) if r.size else 1.0)
+    kept = r[np.abs(r) < HUBER * rough]
+    return max(1.0, float(np.sqrt(np.mean(kept**2))) if kept.size else 1.0)
+
+
+def log_likelihood(residuals: Sequence[Array], scale: float) -> list[Array]:
+    """Log-likelihood per sample (summed over channels) of each block, up to a constant: Huber's at `scale`, bounded."""
+    out = []
+    for block in residuals:
+        u = np.minimum(np.abs(block) / scale, WILD)
+        out.append(-np.where(u < HUBER, 0.5 * u * u, HUBER * (u - 0.5 * HUBER)).sum(axis=0))
+    return out
+
+
+def _flat(residuals: Sequence[Array]) -> Array:
+    return np.concatenate([block.ravel() for block in residuals])
+
+
+def jacobian(
+    plant: Plant, free: Sequence[Free], point: Point, blocks: Sequence[int], here: Array | None = None
+) -> Array:
+    """Differences of the residual, shape (n_residuals, n_free), into the side with more room to its bound."""
+    points: list[Point] = [] if here is not None else [point]
+    steps = []
+    for f in free:
+        x = point[f.name]
+        step = f.difference if f.high - x >= f.difference else -f.difference
+        points.append({**point, f.name: x + step})
+        steps.append(step)
+    if not points:
+        return np.empty((0 if here is None else len(here), 0))
+    runs = [_flat(r) for r in plant.residuals(points, blocks)]
+    here = here if here is not None else runs.pop(0)
+    return np.stack([(run - here) / step for run, step in zip(runs, steps, strict=True)], axis=1)
+
+
+def fit(
+    plant: Plant,
+    free: Sequence[Free],
+    start: Point,
+    blocks: Sequence[int],
+    *,
+    max_iterations: int = 12,
+    frozen: Array | None = None,
+) -> Fit:
+    """Fit `free` on `blocks` from `start` (which also holds the values that stay fixed).
+
+    Levenberg and Marquardt's method on normal equations with Huber's weights; parameters at a bound that the slope
+    pushes outwards are held there. (`scipy.optimize.least_squares` decomposes the whole Jacobian in every iteration,
+    ten times the cost of the simulations here.)
+
+    `frozen`, shape (n_residuals, n_known): slopes of the first `n_known` parameters, taken as they are instead of
+    being differenced in every iteration (a few parameters are added to many that are fitted already).
+    """
+    free, blocks = tuple(free), tuple(blocks)
+    names = [f.name for f in free]
+    low, high = np.array([f.low for f in free]), np.array([f.high for f in free])
+    scales = np.array([f.scale for f in free])
+    n_frozen = 0 if frozen is None else frozen.shape[1]
+    known = [(j, f.start, f.prior) for j, f in enumerate(free) if f.prior is not None]
+    prior_slopes = np.zeros((len(known), len(free)))
+    for row, (j, _, sd) in enumerate(known):
+        prior_slopes[row, j] = 1.0 / sd
+
+    def at(x: Array) -> Point:
+        return {**start, **dict(zip(names, x.tolist(), strict=True))}
+
+    def residual(x: Array) -> list[Array]:
+        return plant.residuals([at(x)], blocks)[0]
+
+    def slopes(x: Array, r: Array) -> Array:
+        own = jacobian(plant, free[n_frozen:], at(x), blocks, r)
+        return own if frozen is None else np.hstack((frozen, own))
+
+    def prior(x: Array) -> Array:
+        return np.array([(x[j] - centre) / sd for j, centre, sd in known])
+
+    x = np.clip(np.array([start[name] for name in names]), low, high)
+    residuals = residual(x)
+    scale = scale_of(residuals)
+
+    def loss(r: Array, x: Array) -> float:
+        u = np.minimum(np.abs(r) / scale, RUNAWAY)
+        p = prior(x) / scale
+        return float(np.where(u < HUBER, 0.5 * u * u, HUBER * (u - 0.5 * HUBER)).sum() + 0.5 * (p @ p))
+
+    r = _flat(residuals)
+    here, damping = loss(r, x), 1e-3
+    J = slopes(x, r)
+    for _ in range(max_iterations if free else 0):
+        weight = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(r), 1e-300))
+        Js = J * scales
+        own = prior_slopes * scales
+        A = Js.T @ (weight[:, None] * Js) + own.T @ own
+        g = Js.T @ (weight * r) + own.T @ prior(x)
+        held = ((x <= low) & (g > 0.0)) | ((x >= high) & (g < 0.0))
+        step_taken = False
+        for _ in range(6):
+            step = _step(A, g, damping, ~held) * scales
+            x_new = np.clip(x + step, low, high)
+            trial = residual(x_new)
+            r_new = _flat(trial)
+            there = loss(r_new, x_new)
+            if there < here:
+                step_taken = True
+                break
+            damping = max(10.0 * damping, 1e-3)
+        if not step_taken:
+            break
+        gained, here, x, r, residuals = here - there, there, x_new, r_new, trial
+        damping = max(0.1 * damping, 1e-9)
+        if gained < CONVERGED:
+            break
+        J = slopes(x, r)
+    scale = scale_of(residuals)
+    Js = J * scales
+    own = prior_slopes * scales * scale  # the prior is not loosened by a poor residual
+    A = Js.T @ Js + own.T @ own
+    covariance = np.linalg.pinv(A, rcond=1e-12, hermitian=True) * np.outer(scales, scales) * scale**2
+    return Fit(free, at(x), residuals, covariance, blocks, scale)
+
+
+def _step(A: Array, g: Array, damping: float, moving: NDArray[np.bool_]) -> Array:
+    """Damped Newton step of the parameters that may move, in units of their scales; at most `LONGEST` of each."""
+    step = np.zeros(len(g))
+    if moving.any():
+        part = A[np.ix_(moving, moving)]
+        ridge = damping * np.diag(part) + 1e-9 * np.trace(part) / len(part) + 1e-300
+        step[moving] = -np.linalg.solve(part + np.diag(ridge), g[moving])
+    longest = float(np.max(np.abs(step), initial=0.0))
+    return step * min(1.0, LONGEST / longest) if longest > 0.0 else step
+
+
+def best_fit(
+    plant: Plant,
+    free: Sequence[Free],
+    starts: Sequence[Point],
+    blocks: Sequence[int],
+    *,
+    max_iterations: int = 12,
+    frozen: Array | None = None,
+) -> Fit:
+    """The best of fits from several starts: all are rated by one simulation each, the most promising are fitted."""
+    n_fits = 1 if len(starts) <= 2 else (2 if len(starts) <= 8 else 3)
+    if len(starts) > 1:
+        runs = plant.residuals(starts, blocks)
+        scale = min(scale_of(r) for r in runs)
+        rating = [sum(s.sum() for s in log_likelihood(r, scale)) for r in runs]
+        starts = [starts[j] for j in np.argsort(rating)[::-1][:n_fits]]
+    fits = [fit(plant, free, s, blocks, max_iterations=max_iterations, frozen=frozen) for s in starts]
+    scale = min(f.scale for f in fits)
+    return max(fits, key=lambda f: sum(s.sum() for s in log_likelihood(f.residuals, scale)))

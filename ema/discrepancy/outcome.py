@@ -1,0 +1,64 @@
+"""What the engine found, before a plant puts it into the words of findings.json."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from .plant import Point
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Error before and after on one set of blocks, and what noise alone would make of it."""
+
+    err_before: float
+    err_after: float
+    noise_floor: float
+
+
+@dataclass(frozen=True)
+class RecordGain:
+    """The same for one record on held-out blocks; `rms` is the whitened residual (1 is noise)."""
+
+    name: str
+    err_before: float
+    err_after: float
+    noise_floor: float
+    rms_before: float
+    rms_after: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Outcome of one examination.
+
+    Attributes
+    ----------
+    verdict : str
+        ``adequate``: the residual is noise. ``explained``: with the effects it is noise, or within a fifth of it.
+        ``unexplained``: something is left; `structure` says what it looks like.
+    because : str
+        What the verdict on the plain model rests on.
+    effects : list of dict
+        Name, sentence, confidence, what it cannot be told from, the experiment that would tell, parameters.
+    structure : dict
+        Terms without a name: orders, frequencies, dependence.
+    point : Point
+        All fitted values of the final model.
+    """
+
+    verdict: Literal["adequate", "explained", "unexplained"]
+    because: str
+    p_value: float
+    effects: list[dict[str, Any]]
+    structure: dict[str, Any]
+    train: Gain
+    heldout: Gain
+    base: list[str]
+    k_before: list[float]
+    k_after: list[float]
+    records: list[RecordGain]
+    tried: list[dict[str, Any]]
+    point: Point = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)

@@ -1,0 +1,139 @@
+"""What the engine needs of a plant and its records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Point = Mapping[str, float]  # values of free parameters by name; what is not named is neutral
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter to be fitted.
+
+    `scale` is a change that matters (it conditions the search); `step` the change for a finite difference, above the
+    simulation's own roughness; `prior` the standard deviation about `start` that is known beforehand, if any.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    start: float
+    scale: float
+    step: float = 0.0
+    prior: float | None = None
+
+    @property
+    def difference(self) -> float:
+        """Step of the finite difference."""
+        return self.step or 1e-3 * self.scale
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect, or a term of an unexplained structure, that may be added to the model.
+
+    Parameters
+    ----------
+    key : str
+        Unique in one round, for example ``"cogging"`` or ``"cogging:72"``.
+    effect : str
+        Name in the library (`ema.effects`), or of the kind of structure.
+    free : tuple of Free
+        Parameters to fit; their names are global.
+    starts : tuple of Points
+        Where searches begin; the best one counts. Also holds values that stay fixed during the fit.
+    neutral : Point
+        Values that switch it off.
+    """
+
+    key: str
+    effect: str
+    free: tuple[Free, ...]
+    starts: tuple[Point, ...]
+    neutral: Point = field(default_factory=dict)
+    is_structure: bool = False
+
+
+@dataclass(frozen=True)
+class Block:
+    """An independent part of the records.
+
+    `group` says from which record it is; blocks of one `stretch` of a group lie so close together that one must not
+    be used to check what was fitted on another.
+    """
+
+    label: str
+    group: str
+    n: int
+    stretch: int = 0
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Error of a simulation over some blocks, without unit, and what noise alone would make of it."""
+
+    error: float
+    noise_floor: float
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A value with its interval."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+class Plant(Protocol):
+    """A plant with its records, see the package's description."""
+
+    @property
+    def base(self) -> Sequence[Free]:
+        """Parameters free in every model."""
+        ...
+
+    @property
+    def blocks(self) -> Sequence[Block]:
+        """Independent parts of the records."""
+        ...
+
+    @property
+    def noise_uncertainty(self) -> float:
+        """Relative standard deviation of the noise model's amplitude: 0 where it was declared."""
+        ...
+
+    def residuals(self, points: Sequence[Point], blocks: Sequence[int]) -> list[list[Array]]:
+        """Whitened residuals by point and block, each of shape (n_channels, n_times)."""
+        ...
+
+    def candidates(self, point: Point, blocks: Sequence[int]) -> Sequence[Candidate]:
+        """Effects that could be added to the model at `point`, with starts found on `blocks` only."""
+        ...
+
+    def structure(self, point: Point, blocks: Sequence[int]) -> Sequence[Candidate]:
+        """Terms the residual suggests, best first."""
+        ...
+
+    def errors(self, point: Point, blocks: Sequence[int]) -> Errors:
+        """Error of the simulation and its noise floor."""
+        ...
+
+    def describe(
+        self, candidates: Sequence[Candidate], point: Point, draw: Callable[[int], Sequence[Point]]
+    ) -> list[dict[str, Any]]:
+        """What was found, for findings.json: name, sentence, parameters as Quantity. `draw` samples the uncertainty."""
+        ...
+
+    def describe_structure(self, terms: Sequence[Candidate], point: Point) -> dict[str, Any]:
+        """Terms without a name, for findings.json: sentences, orders, frequencies, what they depend on."""
+        ...

@@ -1,0 +1,209 @@
+"""Forward selection of effects; every score is taken on blocks the parameters were not fitted on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .fitting import Fit, best_fit, jacobian, log_likelihood, scale_of
+from .plant import Array, Block, Candidate, Plant, Point
+
+N_FOLDS = 2
+FEW = 4  # parameters up to which all of them are differenced in every iteration
+N_LEADING = 3  # candidates fitted with all parameters where slopes were frozen
+MIN_PARTS = 40  # parts over which gains are compared in pairs
+ODDS = 5.0  # difference in log-likelihood (150 : 1) from which one explanation is preferred
+NEARLY_NOISE = 1.1  # scale of a residual below which likelihoods can be taken at their word
+SIGNIFICANT = 2.5  # standard errors a mean gain must be above zero
+MIN_SHARE = 0.02  # of the residual above noise that a further effect must explain
+SAME_SHARE = 0.03  # explanations of a residual that none explains fully are alike within this share of the gain
+
+
+def folds(blocks: Sequence[Block]) -> list[list[int]]:
+    """Blocks of each fold: stretches of every record alternately, so that each fold sees every motion."""
+    order: dict[str, dict[int, int]] = {}
+    out: list[list[int]] = [[] for _ in range(N_FOLDS)]
+    for j, block in enumerate(blocks):
+        seen = order.setdefault(block.group, {})
+        k = seen.setdefault(block.stretch, len(seen))
+        out[k % N_FOLDS].append(j)
+    return out
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A model fitted on all but one fold, for each fold: `fits`; `held_out` are residuals of the left-out blocks."""
+
+    accepted: tuple[Candidate, ...]  # by fold the candidates' parameters may differ; these are the first fold's
+    fits: tuple[Fit, ...]
+    models: tuple[tuple[Candidate, ...], ...]
+    held_out: tuple[Array, ...]
+
+    @property
+    def scale(self) -> float:
+        """Scale of the held-out residual, at least 1 (noise)."""
+        return scale_of(self.held_out)
+
+    @property
+    def rms(self) -> float:
+        """Rms of the held-out residual, single wild samples clipped: 1 is noise."""
+        flat = np.concatenate([r.ravel() for r in self.held_out])
+        return float(np.sqrt(np.mean(np.clip(flat, -8 * self.scale, 8 * self.scale) ** 2)))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How much more likely held-out data are under one model than under another."""
+
+    gain: float
+    error: float
+
+    scale: float
+
+    @property
+    def is_significant(self) -> bool:
+        """Better by more than chance. Where something is left unexplained, likelihoods alone promise too much."""
+        return self.gain > ODDS and (self.scale < NEARLY_NOISE or self.gain > SIGNIFICANT * self.error)
+
+    @property
+    def is_clear(self) -> bool:
+        """The other one is ruled out."""
+        return self.gain > ODDS and (self.scale < NEARLY_NOISE or self.gain > 2.0 * self.error)
+
+
+def compare(one: Tried, other: Tried, scale: float | None = None) -> Comparison:
+    """Gain in held-out log-likelihood of `one` over `other`, with its standard error over parts of the records."""
+    scale = scale if scale is not None else min(one.scale, other.scale)
+    parts = max(1, -(-MIN_PARTS // max(len(one.held_out), 1)))
+    gains = []
+    for a, b in zip(log_likelihood(one.held_out, scale), log_likelihood(other.held_out, scale), strict=True):
+        gains += [float(part.sum()) for part in np.array_split(a - b, parts)]
+    d = np.array(gains)
+    error = float(np.std(d, ddof=1) * np.sqrt(len(d))) if len(d) > 1 else np.inf
+    return Comparison(float(d.sum()), error, scale)
+
+
+@dataclass
+class Search:
+    """State of a search: `rounds` keeps for each accepted effect what else was tried in its place."""
+
+    plant: Plant
+    model: Tried
+    without: Tried
+    rounds: list[dict[str, Tried]] = field(default_factory=list)
+    tried: list[dict[str, object]] = field(default_factory=list)
+
+
+Progress = Callable[[str], None]
+
+
+def silent(_: str) -> None:
+    """No progress shown."""
+
+
+def training(plant: Plant) -> list[tuple[list[int], list[int]]]:
+    """For each fold the blocks to fit on and those left out."""
+    everything = range(len(plant.blocks))
+    return [([j for j in everything if j not in set(out)], out) for out in folds(plant.blocks)]
+
+
+def fit_model(
+    plant: Plant,
+    models: Sequence[Sequence[Candidate]],
+    starts: Sequence[Sequence[Point]],
+    frozen: Sequence[Array | None] = (None,) * N_FOLDS,
+) -> Tried:
+    """Fit one model (its candidates by fold) on all but one fold each; `starts` and `frozen` slopes by fold."""
+    fits: list[Fit] = []
+    held: dict[int, Array] = {}
+    for (blocks, left_out), model, start, known in zip(training(plant), models, starts, frozen, strict=True):
+        free = [*plant.base, *(f for c in model for f in c.free)]
+        fitted = best_fit(plant, free, start, blocks, frozen=known)
+        fits.append(fitted)
+        held.update(zip(left_out, plant.residuals([fitted.point], left_out)[0], strict=True))
+    ordered = tuple(held[j] for j in range(len(plant.blocks)))
+    return Tried(tuple(models[0]), tuple(fits), tuple(tuple(m) for m in models), ordered)
+
+
+def base_model(plant: Plant) -> Tried:
+    """The plant as it is, with its base parameters fitted."""
+    start = {f.name: f.start for f in plant.base}
+    return fit_model(plant, [()] * N_FOLDS, [[start]] * N_FOLDS)
+
+
+def one_more(
+    plant: Plant, model: Tried, suggest: Callable[[Point, Sequence[int]], Sequence[Candidate]], progress: Progress
+) -> dict[str, Tried]:
+    """The model with each suggested candidate added. A candidate must be suggested by every fold's training blocks."""
+    suggested, frozen = [], []
+    for (train, _), fitted in zip(training(plant), model.fits, strict=True):
+        suggested.append({c.key: c for c in suggest(fitted.point, train)})
+        here = np.concatenate([r.ravel() for r in fitted.residuals])
+        many = len(fitted.free) > FEW
+        frozen.append(jacobian(plant, fitted.free, fitted.point, train, here) if many else None)
+    out = {}
+    for key in suggested[0]:
+        if not all(key in s for s in suggested):
+            continue
+        progress(key)
+        models = [(*m, s[key]) for m, s in zip(model.models, suggested, strict=True)]
+        starts = [
+            [{**fitted.point, **start} for start in s[key].starts]
+            for fitted, s in zip(model.fits, suggested, strict=True)
+        ]
+        out[key] = fit_model(plant, models, starts, frozen)
+    if any(known is not None for known in frozen):
+        for key in _leading(out, model):
+            progress(f"{key}, all parameters")
+            out[key] = refitted(plant, out[key])
+    return out
+
+
+def _leading(trials: dict[str, Tried], model: Tried) -> list[str]:
+    """The few best candidates, between which the decision lies."""
+    if not trials:
+        return []
+    scale = min(t.scale for t in trials.values())
+    gains = {key: compare(trial, model, scale).gain for key, trial in trials.items()}
+    ranked = sorted(gains, key=lambda key: -gains[key])[:N_LEADING]
+    return [key for key in ranked if gains[key] > 0.5 * gains[ranked[0]]]
+
+
+def refitted(plant: Plant, tried: Tried) -> Tried:
+    """The same model with all its parameters fitted together."""
+    return fit_model(plant, tried.models, [[fitted.point] for fitted in tried.fits])
+
+
+def best_of(trials: dict[str, Tried], model: Tried) -> str:
+    """Key of the candidate under which held-out data are most likely."""
+    scale = min(t.scale for t in trials.values())
+    return max(trials, key=lambda key: compare(trials[key], model, scale).gain)
+
+
+def alike(trials: dict[str, Tried], best: str, model: Tried) -> list[str]:
+    """Candidates the data cannot tell from the best one."""
+    top = trials[best]
+    scale = min(t.scale for t in trials.values())
+    whole = compare(top, model, scale).gain
+    out = []
+    for key, trial in trials.items():
+        if key == best:
+            continue
+        lead = compare(top, trial, scale)
+        unclear = scale > NEARLY_NOISE and lead.gain < SAME_SHARE * whole
+        if (not lead.is_clear or unclear) and compare(trial, model, scale).is_significant:
+            out.append(key)
+    return out
+
+
+def above_noise(tried: Tried) -> float:
+    """Mean square of the held-out residual above that of noise."""
+    return max(tried.rms**2 - 1.0, 0.0)
+
+
+def is_worth_it(new: Tried, old: Tried) -> bool:
+    """A further effect must be significant and explain a share of what is not noise."""
+    share = (above_noise(old) - above_noise(new)) / max(above_noise(old), 1e-12)
+    return compare(new, old).is_significant and share > MIN_SHARE

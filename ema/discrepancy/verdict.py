@@ -1,0 +1,78 @@
+"""Is a whitened residual noise?  Tests with a calibrated false-alarm rate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from .plant import Array
+
+FALSE_ALARMS = 0.005  # of all tests together
+GROUPS = (1, 8, 64)  # samples averaged before a chi-square: the time scales looked at
+N_LAGS = 8
+CLIP = 5.0  # a single wild sample is not a cause
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Answer of the tests: the smallest p-value after correction for their number, and which test gave it."""
+
+    p_value: float
+    because: str
+    rms: float
+
+    @property
+    def is_noise(self) -> bool:
+        """True where the residual is compatible with noise."""
+        return self.p_value >= FALSE_ALARMS
+
+
+def scale_test(residuals: Sequence[Array], group: int, noise_uncertainty: float, n_free: int) -> float:
+    """P-value of the mean square of group means being no larger than noise makes it."""
+    total, count = 0.0, 0
+    for block in residuals:
+        n = block.shape[1] // group * group
+        if n:
+            means = np.clip(block[:, :n], -CLIP, CLIP).reshape(len(block), -1, group).sum(axis=2) / np.sqrt(group)
+            total += float((means**2).sum())
+            count += means.size
+    if count <= n_free:
+        return 1.0
+    spread = np.sqrt(2.0 / count + (2.0 * noise_uncertainty) ** 2)
+    if noise_uncertainty > 0.0:
+        return float(stats.norm.sf((total / count - 1.0) / spread))
+    return float(stats.chi2.sf(total, count))
+
+
+def correlation_test(residuals: Sequence[Array], n_lags: int = N_LAGS) -> float:
+    """P-value of neighbouring residuals being uncorrelated (Ljung and Box over blocks and channels)."""
+    n_channels = max((len(block) for block in residuals), default=0)
+    statistic, used = 0.0, 0
+    for channel in range(n_channels):
+        parts = [np.clip(block[channel], -CLIP, CLIP) for block in residuals if channel < len(block)]
+        parts = [x for x in parts if len(x) > 4 * n_lags]
+        power = sum(float(x @ x) for x in parts)
+        n = sum(len(x) for x in parts)
+        if not parts or power == 0.0:
+            continue
+        for lag in range(1, n_lags + 1):
+            rho = sum(float(x[lag:] @ x[:-lag]) for x in parts) / power
+            statistic += n * rho**2
+            used += 1
+    return float(stats.chi2.sf(statistic, used)) if used else 1.0
+
+
+def judge(residuals: Sequence[Array], *, noise_uncertainty: float = 0.0, n_free: int = 0) -> Verdict:
+    """Verdict on residuals."""
+    p = {
+        f"residual larger than noise at {g} samples": scale_test(residuals, g, noise_uncertainty, n_free)
+        for g in GROUPS
+    }
+    p["neighbouring residuals are correlated"] = correlation_test(residuals)
+    corrected = {name: min(1.0, value * len(p)) for name, value in p.items()}
+    because = min(corrected, key=lambda name: corrected[name])
+    flat = np.concatenate([np.clip(block, -CLIP, CLIP).ravel() for block in residuals])
+    return Verdict(corrected[because], because, float(np.sqrt(np.mean(flat**2))))

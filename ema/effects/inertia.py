@@ -1,0 +1,14 @@
+"""Inertia (or mass) other than the plant file says."""
+
+from __future__ import annotations
+
+from .base import Effect, Parameter
+
+EFFECT = Effect(
+    name="inertia",
+    parameters=(Parameter("change", "1", 0.0, -0.8, 3.0, 0.05, "relative change of inertia or mass"),),
+    sentence="the moving inertia differs by {change:+.1%}",
+    separated_by="weighing, or a known load that changes only the torque",
+    mistaken_for=("k1",),
+    plants=("axis",),
+)

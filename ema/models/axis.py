@@ -1,0 +1,131 @@
+"""The axis model: simulate windows of records with the recorded drive and start states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema.effects import registry
+from ema.effects.torque_term import COLUMNS, NEUTRAL
+
+from . import axis_kernel as kernel
+from .axis_config import INSTANCE, Axis
+from .axis_layout import N_ROWS, row
+
+Array = NDArray[np.float64]
+MODES = {
+    "current": kernel.CURRENT,
+    "voltage": kernel.VOLTAGE,
+    "force": kernel.FORCE,
+    "speed-loop": kernel.SPEED_LOOP,
+}
+Effects = Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class Model:
+    """Numbers of one axis, ready for the kernel: parameter array, cogging lines, unnamed terms."""
+
+    z: Array
+    lines: Array
+    terms: Array
+
+
+def model(
+    plant: Axis,
+    effects: Effects | None = None,
+    structure: Sequence[Mapping[str, float]] = (),
+    **changed: float,
+) -> Model:
+    """Numbers for `plant` with further effects and terms; keyword arguments replace parameters (``F_d=0.1``).
+
+    A changed F_d takes F_s with it: their ratio stays.
+    """
+    z = np.zeros(N_ROWS)
+    ratio = plant.F_s / plant.F_d if plant.F_s is not None and plant.F_d > 0.0 else 1.0
+    values: dict[str, float | None] = {
+        **{"J": plant.inertia, "C": plant.C, "F_d": plant.F_d, "F_s": plant.F_s},
+        **{"k_t": plant.k_t, "k_e": plant.k_e, "R": plant.R, "L": plant.L},
+        **({"K_w": plant.loop.K_w, "I_max": plant.loop.I_max} if plant.loop else {}),
+    }
+    values |= {"J" if name == "M" else name: value for name, value in changed.items()}
+    if "F_d" in changed or values["F_s"] is None:
+        values["F_s"] = ratio * float(values["F_d"] or 0.0)
+    if values["k_t"] is None:
+        values["k_t"] = 1.0
+    for name, value in values.items():
+        z[row(name)] = 0.0 if value is None else value
+    for name, effect in registry().items():
+        if "axis" in effect.plants:
+            for parameter in effect.parameters:
+                z[row(f"{name}.{parameter.name}")] = parameter.neutral
+    merged: dict[str, Mapping[str, float]] = {**plant.effects, **(effects or {})}
+    lines = []
+    for key, given in merged.items():
+        name = key.split(INSTANCE)[0]
+        if name == "cogging":
+            full = {**registry()[name].neutral(), **given}
+            lines.append([full["amplitude"], full["order"], full["phase"]])
+            continue
+        for parameter_name, number in given.items():
+            z[row(f"{name}.{parameter_name}")] = number
+    neutral = dict(zip(COLUMNS, NEUTRAL, strict=True))
+    terms = [[{**neutral, **term}[name] for name in COLUMNS] for term in (*plant.structure, *structure)]
+    return Model(z, np.array(lines).reshape(-1, 3), np.array(terms).reshape(-1, len(COLUMNS)))
+
+
+def simulate(
+    numbers: Model,
+    drive: str,
+    offsets: NDArray[np.int64],
+    t: Array,
+    recorded: Array,
+    starts: Array,
+    h_max: float,
+    dT: Array | None = None,
+) -> Array:
+    """Outputs (4, n_times) of all windows: position, speed, current, voltage as the sensors show them.
+
+    Parameters
+    ----------
+    drive : str
+        What `recorded` is: current, voltage, force, or (speed-loop) commanded speed.
+    offsets : array, shape (n_windows + 1,)
+        Window j is samples ``offsets[j]:offsets[j + 1]``.
+    starts : array, shape (n_windows, 2)
+        True position and speed at each window's first sample.
+    dT : array, shape (n_windows,), optional
+        Winding temperature less 20 °C. [K]
+    """
+    dT = np.zeros(len(starts)) if dT is None else dT
+    out = np.empty((len(kernel.OUTPUTS), len(t)))
+    kernel.simulate_windows(
+        numbers.z, numbers.lines, numbers.terms, MODES[drive], offsets, t, recorded, starts, dT, h_max, out
+    )
+    return out
+
+
+def holding(numbers: Model, theta: Array, direction: Array, t: Array) -> Array:
+    """Current that holds the axis at angles `theta`, approached in `direction`, shape of `theta`. [A]"""
+    out = np.empty(len(theta))
+    kernel.holding_current(numbers.z, numbers.lines, numbers.terms, theta, direction, t, out)
+    return out
+
+
+def true_state(numbers: Model, measured: Array) -> Array:
+    """Position and speed behind measured ones (n, 2): the sensor's angle error undone."""
+    out = np.empty(measured.shape)
+    kernel.undo_angle_error(numbers.z, measured, out)
+    return out
+
+
+def torque_along(
+    numbers: Model, theta: Array, w: Array, i: Array, t: Array, dT: Array, *, force: bool = False
+) -> Array:
+    """Torque left to accelerate the axis along a measured motion, arrays of one shape. [N m or N]"""
+    out = np.empty(len(theta))
+    kernel.torque_along(numbers.z, numbers.lines, numbers.terms, theta, w, i, t, dT, force, out)
+    return out

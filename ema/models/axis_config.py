@@ -1,0 +1,156 @@
+"""The configuration of a single axis: one inertia or mass driven by a measured current, voltage or force."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+
+from ema.core import config
+from ema.core.config import Settings
+from ema.core.names import CHANNELS
+from ema.core.units import quantity, to_unit
+from ema.effects import registry
+from ema.effects.torque_term import COLUMNS
+
+INSTANCE = "#"  # cogging#2 is a second cogging line
+
+
+def _noise(value: Any, info: ValidationInfo) -> Any:
+    if not isinstance(value, dict):
+        return value
+    unknown = sorted(set(value) - set(CHANNELS))
+    if unknown:
+        raise ValueError(f"unknown channel {', '.join(unknown)}")
+    return {name: to_unit(x, CHANNELS[name].unit) if isinstance(x, str) else x for name, x in value.items()}
+
+
+class SpeedLoop(Settings):
+    """Proportional speed control:  i_q = sat(K_w (ω_ref - ω_m), ±I_max)."""
+
+    K_w: float = quantity("A s/rad", "gain of the speed loop", gt=0, le=1e4)
+    I_max: float = quantity("A", "limit of the current", 1e6, gt=0)
+
+
+class Axis(Settings):
+    """What rotary and linear axes share. `fitted` names parameters whose plant-file values are only a start."""
+
+    kind: Literal["axis"] = "axis"
+    name: str = Field(default="axis", min_length=1, max_length=80)
+    drive: Literal["current", "voltage", "force", "speed-loop"] = "current"
+    R: float | None = quantity("ohm", "resistance seen by the drive voltage", None, ge=0, le=1e4)
+    L: float | None = quantity("H", "inductance seen by the drive voltage", None, ge=0, le=10)
+    loop: SpeedLoop | None = None
+    fitted: tuple[Literal["J", "M", "C", "k_t", "k_e", "R", "L"], ...] = ()
+    noise: Annotated[dict[str, float], BeforeValidator(_noise)] = Field(
+        default_factory=dict, description="rms noise by channel [unit of the channel]; estimated where not given"
+    )
+    window: float | None = quantity(
+        "s", "length of the parts of a record that are simulated on their own; chosen if not given", None, gt=0, le=1e3
+    )
+    effects: dict[str, dict[str, float]] = Field(default_factory=dict, description="terms beyond the nominal model")
+    structure: tuple[dict[str, float], ...] = Field(
+        default=(), description="terms without a name, as `ema discrepancy` found them"
+    )
+
+    @field_validator("noise")
+    @classmethod
+    def _positive(cls, noise: dict[str, float]) -> dict[str, float]:
+        for name, rms in noise.items():
+            if not 0.0 < rms < 1e12:
+                raise ValueError(f"noise of {name} must be positive")
+        return noise
+
+    @field_validator("effects")
+    @classmethod
+    def _known_effects(cls, effects: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
+        for key, values in effects.items():
+            name = key.split(INSTANCE)[0]
+            if name not in registry() or "axis" not in registry()[name].plants:
+                known = ", ".join(n for n, effect in registry().items() if "axis" in effect.plants)
+                raise ValueError(f"effect '{key}' is unknown for an axis; known: {known}")
+            if key != name and name != "cogging":
+                raise ValueError(f"effect '{key}': only cogging may occur more than once")
+            unknown = sorted(set(values) - {p.name for p in registry()[name].parameters})
+            if unknown:
+                raise ValueError(f"effect '{key}' has no parameter {', '.join(unknown)}")
+        return effects
+
+    @field_validator("structure")
+    @classmethod
+    def _known_columns(cls, structure: tuple[dict[str, float], ...]) -> tuple[dict[str, float], ...]:
+        unknown = sorted({name for term in structure for name in term} - set(COLUMNS))
+        if unknown:
+            raise ValueError(f"unknown {', '.join(unknown)}; known: {', '.join(COLUMNS)}")
+        return structure
+
+    @model_validator(mode="after")
+    def _complete(self) -> Axis:
+        if self.drive == "voltage" and (self.R is None or self.k_e is None or self.k_t is None):
+            raise ValueError("drive: voltage needs R, k_e and k_t")
+        if self.drive in ("current", "speed-loop") and self.k_t is None:
+            raise ValueError(f"drive: {self.drive} needs k_t")
+        if self.drive == "speed-loop" and self.loop is None:
+            raise ValueError("drive: speed-loop needs loop: {K_w: …}")
+        if self.F_s is not None and self.F_s < self.F_d:
+            raise ValueError(f"static friction F_s = {self.F_s} must not be below sliding friction F_d = {self.F_d}")
+        for name in self.fitted:
+            if getattr(self, name, None) is None:
+                raise ValueError(f"'{name}' is to be fitted and has no value to start from")
+        return self
+
+    # declared with their units by the two kinds of axis
+    F_d: float
+    F_s: float | None
+    C: float
+    k_t: float | None
+    k_e: float | None
+
+    @property
+    def inertia(self) -> float:
+        """Inertia [kg m²] or mass [kg]."""
+        raise NotImplementedError
+
+
+class RotaryAxis(Axis):
+    """One inertia."""
+
+    motion: Literal["rotary"] = "rotary"
+    J: float = quantity("kg m^2", "inertia", gt=0, le=1e6)
+    F_d: float = quantity("N m", "sliding friction", ge=0, le=1e6)
+    F_s: float | None = quantity("N m", "static friction; that of sliding if not given", None, ge=0, le=1e6)
+    C: float = quantity("N m s/rad", "viscous coefficient", 0.0, ge=0, le=1e6)
+    k_t: float | None = quantity("N m/A", "torque per current", None, gt=0, le=1e4)
+    k_e: float | None = quantity("V s/rad", "back-EMF per speed", None, gt=0, le=1e4)
+    p: int | None = Field(default=None, ge=1, le=200, description="pole pairs")
+    slots: int | None = Field(default=None, ge=1, le=1000, description="slots of the stator")
+
+    @property
+    def inertia(self) -> float:
+        """Inertia. [kg m²]"""
+        return self.J
+
+
+class LinearAxis(Axis):
+    """One mass."""
+
+    motion: Literal["linear"]
+    M: float = quantity("kg", "mass", gt=0, le=1e9)
+    F_d: float = quantity("N", "sliding friction", ge=0, le=1e9)
+    F_s: float | None = quantity("N", "static friction; that of sliding if not given", None, ge=0, le=1e9)
+    C: float = quantity("N s/m", "viscous coefficient", 0.0, ge=0, le=1e9)
+    k_t: float | None = quantity("N/A", "force per current", None, gt=0, le=1e6)
+    k_e: float | None = quantity("V s/m", "back-EMF per speed", None, gt=0, le=1e6)
+
+    @property
+    def inertia(self) -> float:
+        """Mass. [kg]"""
+        return self.M
+
+
+def load(path: Any) -> RotaryAxis | LinearAxis:
+    """Read an axis plant file."""
+    data = config.read_yaml(path)
+    if data.get("motion") == "linear":
+        return config.validate(data, LinearAxis, path)
+    return config.validate(data, RotaryAxis, path)

@@ -1,0 +1,225 @@
+"""The axis model's equations: one inertia or mass from sample to sample of a recorded drive.
+
+    J dω_m/dt = τ_m - C ω_m - τ_friction(ω_m, τ) - τ_effects         τ_m = k_t i  (or the recorded force)
+    L di/dt   = u - R i - k_e ω_m                                    where the voltage drives
+    i         = sat(K_w (ω_ref - ω_m,measured), ±I_max)              where the speed loop is simulated
+
+For a linear axis read position, speed, mass and force; the equations are the same.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from ema.effects import cogging, torque_term
+from ema.effects.dry_friction import speed_after
+
+from . import jit  # noqa: F401  (sets the cache folder before anything is compiled)
+from .axis_layout import row
+from .hooks import combined
+
+CURRENT, VOLTAGE, FORCE, SPEED_LOOP = range(4)
+OUTPUTS = ("theta_m", "w_m", "i_q", "u_q")
+
+_cogging = njit(inline="always")(cogging.torque)
+shaft_torque = combined("shaft_torque", "axis", row)
+user_torque = combined("user_torque", "axis", row)
+static_friction = combined("static_friction", "axis", row)
+sliding_friction = combined("sliding_friction", "axis", row)
+emf_factor = combined("emf_factor", "axis", row)
+resistance_factor = combined("resistance_factor", "axis", row)
+inductance_factor = combined("inductance_factor", "axis", row)
+angle_error = combined("angle_error", "axis", row)
+
+J, C, F_S, F_D, K_T, K_E, R, L = (row(name) for name in ("J", "C", "F_s", "F_d", "k_t", "k_e", "R", "L"))
+K_W, I_MAX, DT = row("K_w"), row("I_max"), row("dT")
+INERTIA, GAIN, OFFSET = row("inertia.change"), row("drive_gain.gain"), row("drive_offset.offset")
+DROP, SKEW = row("inverter_drop.voltage"), row("clock_skew.rate")
+POSITION_DELAY, SPEED_DELAY = row("position_delay.time"), row("speed_delay.time")
+COGGING = row("cogging.amplitude")
+
+
+@njit(inline="always")
+def torques(z, lines, terms, theta, w, i, t):
+    """Torques that oppose positive motion besides dry friction.   [N m or N]"""
+    tau = z[C] * w + shaft_torque(z, 0, 1, theta, w, theta, i) + user_torque(z, 0, 1, theta)
+    for k in range(lines.shape[0]):
+        tau += _cogging(theta, w, theta, i, lines[k, 0], lines[k, 1], lines[k, 2])
+    for k in range(terms.shape[0]):
+        if terms[k, 11] == 0.0:
+            tau += torque_term.value(theta, w, i, t, terms[k])
+    return tau
+
+
+@njit(inline="always")
+def friction(z, terms, theta, w, tau, tau_m, i, t):
+    """Static and sliding friction.   [N m or N]"""
+    direction = 1.0 if (w if w != 0.0 else tau) > 0.0 else -1.0
+    F_s = z[F_S] * static_friction(z, 0, 1, theta, w, theta, direction, tau_m)
+    F_d = z[F_D] * sliding_friction(z, 0, 1, theta, w, theta, direction, tau_m)
+    for k in range(terms.shape[0]):
+        if terms[k, 11] != 0.0:
+            more = torque_term.value(theta, w, i, t, terms[k])
+            F_s += more
+            F_d += more
+    return max(F_s, F_d, 0.0), max(F_d, 0.0)  # what keeps sliding at creep holds at rest
+
+
+@njit(inline="always")
+def delayed(t, x, k, delay, slope):
+    """Value of x at t[k] - delay by linear interpolation; before the first sample along `slope`."""
+    at = t[k] - delay
+    if at <= t[0]:
+        return x[0] + slope * (at - t[0])
+    j = k
+    while t[j] > at:
+        j -= 1
+    if j >= k:
+        return x[k]
+    return x[j] + (x[j + 1] - x[j]) * (at - t[j]) / (t[j + 1] - t[j])
+
+
+@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
+def simulate_window(z, lines, terms, mode, t, drive, theta, w, h_max, out):
+    """Simulate one window from position `theta` and speed `w`.
+
+    Parameters
+    ----------
+    z : array, shape (N_ROWS,)
+        Parameters and effects.
+    lines : array, shape (n_lines, 3)
+        Cogging lines: amplitude, order, phase.
+    terms : array, shape (n_terms, len(torque_term.COLUMNS))
+    mode : int
+        CURRENT, VOLTAGE, FORCE or SPEED_LOOP: what `drive` is (current, voltage, force, commanded speed).
+    t, drive : arrays, shape (n_times,)
+        Sample times and the recorded drive; between samples it runs straight (a commanded speed is held).
+    h_max : float
+        Longest step. [s]
+    out : array, shape (4, n_times)
+        Filled with `OUTPUTS` as the sensors show them.
+    """
+    n = t.shape[0]
+    inertia = z[J] * (1.0 + z[INERTIA])
+    gain = 1.0 / (1.0 + z[GAIN])
+    R_now = z[R] * resistance_factor(z, 0, 1, z[DT])
+    skew = 1.0 + z[SKEW]
+    d_w = z[SPEED_DELAY]
+    i, slope = 0.0, 0.0
+    if mode == VOLTAGE:
+        u = (drive[0] - z[OFFSET]) * gain
+        i = (u - z[K_E] * emf_factor(z, 0, 1, 0.0, z[DT]) * w) / max(R_now, 1e-9)
+    for k in range(n):
+        out[0, k], out[1, k] = theta, w
+        if mode == CURRENT:
+            i = (drive[k] - z[OFFSET]) * gain
+        elif mode == SPEED_LOOP:
+            w_meas = delayed(t, out[1], k, d_w, slope)
+            i = min(max(z[K_W] * (drive[k] - w_meas), -z[I_MAX]), z[I_MAX])
+        out[2, k] = i
+        if k == n - 1:
+            break
+        span = (t[k + 1] - t[k]) * skew
+        n_steps = max(1, math.ceil(span / h_max - 1e-9))
+        h = span / n_steps
+        i_here = i
+        for s in range(n_steps):
+            x = (s + 0.5) / n_steps
+            t_mid = t[k] + x * (t[k + 1] - t[k])
+            if mode == SPEED_LOOP:
+                i = i_here
+            else:
+                u = (drive[k] + x * (drive[k + 1] - drive[k]) - z[OFFSET]) * gain
+                if mode == VOLTAGE:
+                    k_e = z[K_E] * emf_factor(z, 0, 1, i, z[DT])
+                    L_now = max(z[L] * inductance_factor(z, 0, 1, i), 1e-12)
+                    e = u - k_e * w - z[DROP] * min(max(i / 1e-2, -1.0), 1.0)
+                    # implicit in R i: stable also where L / R is shorter than the step
+                    i = (i + h / L_now * e) / (1.0 + h / L_now * R_now)
+                else:
+                    i = u
+            tau_m = i if mode == FORCE else z[K_T] * emf_factor(z, 0, 1, i, z[DT]) * i
+            # positions half a step ahead: second order for everything but friction
+            theta_mid = theta + 0.5 * h * w
+            tau = tau_m - torques(z, lines, terms, theta_mid, w, i, t_mid)
+            F_s, F_d = friction(z, terms, theta_mid, w, tau, tau_m, i, t_mid)
+            w_next = speed_after(w, tau, F_s, F_d, h / inertia)
+            theta += 0.5 * h * (w + w_next)
+            w = w_next
+        if k == 0:
+            slope = (w - out[1, 0]) / span
+    _sensors(z, t, skew, slope, out, R_now, mode, drive, gain)
+
+
+@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
+def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
+    """Replace what happened by what the sensors show: voltage, resolver error, delays."""
+    n = t.shape[0]
+    for k in range(n):
+        if mode in (VOLTAGE, FORCE):
+            out[3, k] = drive[k]
+            continue
+        i = out[2, k]
+        a, b = max(k - 1, 0), min(k + 1, n - 1)
+        di = (out[2, b] - out[2, a]) / ((t[b] - t[a]) * skew) if b > a else 0.0
+        k_e = z[K_E] * emf_factor(z, 0, 1, i, z[DT])
+        drop = z[DROP] * min(max(i / 1e-2, -1.0), 1.0)
+        out[3, k] = R_now * i + z[L] * inductance_factor(z, 0, 1, i) * di + k_e * out[1, k] + drop
+    for k in range(n - 1, -1, -1):  # backwards, since the undelayed values of earlier samples are still needed
+        w0 = out[1, 0]
+        theta = delayed(t, out[0], k, z[POSITION_DELAY], w0) if z[POSITION_DELAY] > 0.0 else out[0, k]
+        w = delayed(t, out[1], k, z[SPEED_DELAY], slope) if z[SPEED_DELAY] > 0.0 else out[1, k]
+        ahead = angle_error(z, 0, 1, theta + 1e-3) - angle_error(z, 0, 1, theta - 1e-3)
+        out[0, k] = theta + angle_error(z, 0, 1, theta)
+        out[1, k] = w * (1.0 + ahead / 2e-3)
+        if mode in (CURRENT, SPEED_LOOP):
+            out[2, k] = out[2, k] * (1.0 + z[GAIN]) + z[OFFSET]
+
+
+@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
+def simulate_windows(z, lines, terms, mode, offsets, t, drive, starts, dT, h_max, out):
+    """Simulate windows `offsets[j]:offsets[j + 1]` of the concatenated arrays, each from its own start (θ, ω)."""
+    for j in range(offsets.shape[0] - 1):
+        a, b = offsets[j], offsets[j + 1]
+        z[DT] = dT[j]
+        simulate_window(z, lines, terms, mode, t[a:b], drive[a:b], starts[j, 0], starts[j, 1], h_max, out[:, a:b])
+
+
+@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
+def holding_current(z, lines, terms, theta, direction, t, out):
+    """Current that holds the axis at rest at angles `theta`, each approached in `direction` (±1).   [A, or N]
+
+    The holding torque lies at the edge of friction on the side from which the angle was approached.
+    """
+    for k in range(theta.shape[0]):
+        i = 0.0
+        for _ in range(3):  # the torque constant and load-dependent friction depend on the current they decide
+            k_t = z[K_T] * emf_factor(z, 0, 1, i, z[DT])
+            _, F_d = friction(z, terms, theta[k], direction[k] * 1e-9, 0.0, k_t * i, i, t[k])
+            i = (torques(z, lines, terms, theta[k], direction[k] * 1e-9, i, t[k]) + F_d * direction[k]) / k_t
+        out[k] = i * (1.0 + z[GAIN]) + z[OFFSET]
+
+
+@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
+def undo_angle_error(z, measured, out):
+    """True position and speed (n, 2) from measured ones."""
+    for k in range(measured.shape[0]):
+        theta = measured[k, 0]
+        for _ in range(3):
+            theta = measured[k, 0] - angle_error(z, 0, 1, theta)
+        ahead = angle_error(z, 0, 1, theta + 1e-3) - angle_error(z, 0, 1, theta - 1e-3)
+        out[k, 0] = theta
+        out[k, 1] = measured[k, 1] / (1.0 + ahead / 2e-3)
+
+
+@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
+def torque_along(z, lines, terms, theta, w, i, t, dT, is_force, out):
+    """Accelerating torque the model sees along a measured motion: drive less everything that opposes it."""
+    for k in range(theta.shape[0]):
+        z[DT] = dT[k]
+        tau_m = i[k] if is_force else z[K_T] * emf_factor(z, 0, 1, i[k], z[DT]) * i[k]
+        tau = tau_m - torques(z, lines, terms, theta[k], w[k], i[k], t[k])
+        _, F_d = friction(z, terms, theta[k], w[k], tau, tau_m, i[k], t[k])
+        out[k] = tau - (F_d if w[k] > 0.0 else -F_d)

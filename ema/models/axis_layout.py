@@ -1,0 +1,19 @@
+"""Rows of the axis model's parameter array (see `layout` for the three-phase one)."""
+
+from __future__ import annotations
+
+from ema.effects import registry
+
+# F_s, F_d: static and sliding friction; dT: winding temperature less 20 °C
+PARAMETERS = ("J", "C", "F_s", "F_d", "k_t", "k_e", "R", "L", "K_w", "I_max", "dT")
+# Cogging lines are a table of their own, since a motor has several.
+_effects = tuple(
+    f"{name}.{p.name}" for name, effect in registry().items() if "axis" in effect.plants for p in effect.parameters
+)
+ROWS = {name: row for row, name in enumerate((*PARAMETERS, *_effects))}
+N_ROWS = len(ROWS)
+
+
+def row(name: str) -> int:
+    """Row of a parameter (``"J"``) or of an effect's parameter (``"stribeck.speed"``)."""
+    return ROWS[name]
