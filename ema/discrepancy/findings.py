@@ -104,7 +104,7 @@ class Findings:
     def sentences(self) -> list[str]:
         """What an engineer would say."""
         if self.verdict == "adequate":
-            return ["The simulation agrees with the measurement: what is left is switching noise."]
+            return ["The simulation agrees with the measurement: what is left is noise."]
         said = [
             effect.sentence[0].upper() + effect.sentence[1:]
             + (f" (or {' or '.join(effect.indistinguishable_from)}; told apart by {effect.separated_by})"

@@ -8,14 +8,30 @@ from types import ModuleType
 import pytest
 
 
-@pytest.fixture(scope="session")
-def hidden() -> ModuleType:
-    """The independent actuator with flaws to hide (tests/support/hidden_actuator.py)."""
-    path = Path(__file__).parents[1] / "support" / "hidden_actuator.py"
-    spec = importlib.util.spec_from_file_location("hidden_actuator", path)
+def _support(name: str) -> ModuleType:
+    path = Path(__file__).parents[1] / "support" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules["hidden_actuator"] = module
+    sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="session")
+def hidden() -> ModuleType:
+    """The independent actuator with flaws to hide (tests/support/hidden_actuator.py)."""
+    return _support("hidden_actuator")
+
+
+@pytest.fixture(scope="session")
+def axis_bench() -> ModuleType:
+    """The independent motor bench (tests/support/axis_bench.py)."""
+    return _support("axis_bench")
+
+
+@pytest.fixture(scope="session")
+def hidden_axis(axis_bench: ModuleType) -> ModuleType:
+    """What can be hidden in that bench (tests/support/hidden_axis.py)."""
+    return _support("hidden_axis")

@@ -2,7 +2,7 @@
 
 A rotary axis under proportional speed control, integrated by the midpoint rule over all cycles at once; friction after
 Karnopp (a band of speed counts as rest) and not by the four-state rule. What is hidden in it enters by other
-functions than the library's where physics allows: see `hidden.py`.
+functions than the library's where physics allows: see `hidden_axis.py`.
 """
 
 from __future__ import annotations

@@ -143,7 +143,7 @@ def position_friction(bench, rng):
     """A stretch with soft edges (two logistic steps), not a Gaussian."""
     h, c, w = rng.uniform(0.4, 1.5), rng.uniform(-1.0, 5.0), rng.uniform(0.5, 1.5)
     bench.friction = lambda th, w_, i, t, d: (
-        1.0 + h * (1.0 / (1.0 + np.exp(-(th - c + w) / (0.15 * w))) - 1.0 / (1.0 + np.exp(-(th - c - w) / (0.15 * w))))
+        1.0 + h * (1.0 / (1.0 + np.exp(-(th - c + w) / (0.4 * w))) - 1.0 / (1.0 + np.exp(-(th - c - w) / (0.4 * w))))
     )
     return {"height": h, "centre": c}
 

@@ -1,0 +1,37 @@
+"""Records the axis cannot be examined with: one line that says what is missing, never a cause."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema.core.errors import RecordError
+from ema.core.records import Cycle, Record
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.models.axis_config import RotaryAxis
+
+PLANT = RotaryAxis(J=5e-5, F_d=0.02, k_t=0.05)
+T = np.arange(0.0, 1.0, 1e-3)
+I = np.sin(9.0 * T)
+W = 20.0 * np.sin(9.0 * T) + 0.01 * np.cos(900.0 * T)
+
+
+def record(**channels):
+    return Record((Cycle(0, {"t": T, **channels}),))
+
+
+@pytest.mark.parametrize(
+    ("measured", "said"),
+    [
+        (record(i_a=I, w_m=W), "missing channel i_q [A]"),
+        (record(i_q=I), "missing channel theta_m [rad] or w_m [rad/s]"),
+        (record(i_q=I, w_m=np.full(len(T), 3.0)), "does not move"),
+        (record(i_q=I, w_m=np.clip(W, -15.0, 15.0)), "w_m is clipped at 15 rad/s"),
+        (record(i_q=np.clip(I, -0.8, 0.8), w_m=W), "i_q is clipped"),
+        (Record((Cycle(0, {"t": T[:20], "i_q": I[:20], "w_m": W[:20]}),)), "too short"),
+    ],
+)
+def test_what_is_missing_is_said(measured, said):
+    with pytest.raises(RecordError) as caught:
+        AxisPlant(PLANT, [measured])
+    assert said in str(caught.value)

@@ -1,0 +1,65 @@
+"""Effects hidden in a bench that shares no code with the finder (tests/support): they must be found, and not invented.
+
+A few seeds only; the table over many is printed by ``make bench-discrepancy``.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.examine import examine
+from ema.models.axis_config import RotaryAxis
+
+
+def look(axis_bench, hidden_axis, names, seed):
+    bench, truth, rng = hidden_axis.bench_with(names, seed)
+    plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [axis_bench.record(bench, rng)])
+    return examine(plant), truth
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_hidden_is_adequate(axis_bench, hidden_axis, seed):
+    outcome, _ = look(axis_bench, hidden_axis, [], seed)
+    assert outcome.verdict == "adequate"
+    assert outcome.effects == []
+
+
+def test_more_friction_is_fitted_and_not_called_an_effect(axis_bench, hidden_axis):
+    bench, _, rng = hidden_axis.bench_with([], 11)
+    bench.F_d, bench.F_s = 1.6 * bench.F_d, 1.6 * bench.F_s
+    plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [axis_bench.record(bench, rng)])
+    outcome = examine(plant)
+    assert outcome.verdict == "adequate"
+    assert outcome.k_after[0] == pytest.approx(bench.F_d, rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "parameter", "tolerance"),
+    [
+        ("viscous_drag", "coefficient", 0.15),
+        ("cogging", "order", 1e-9),
+        ("asymmetric_friction", "asymmetry", 0.05),
+        ("speed_delay", "time", 0.05),
+        ("magnet_flux", "change", 0.1),
+    ],
+)
+def test_a_hidden_effect_is_named_measured_and_held_out_error_falls(
+    axis_bench, hidden_axis, name, parameter, tolerance
+):
+    outcome, truth = look(axis_bench, hidden_axis, [name], 1)
+    found = outcome.effects[0]
+    assert name in {found["name"], *found["indistinguishable_from"]}
+    assert len(found["indistinguishable_from"]) <= 1
+    assert found["parameters"][parameter]["value"] == pytest.approx(truth[name][parameter], rel=tolerance)
+    assert outcome.verdict == "explained"
+    assert outcome.records[0].rms_after < 1.2
+
+
+@pytest.mark.slow
+def test_a_line_of_no_whole_order_is_unexplained_with_its_order(axis_bench, hidden_axis):
+    outcome, truth = look(axis_bench, hidden_axis, ["odd_line"], 1)
+    assert outcome.verdict == "unexplained"
+    assert outcome.effects == []
+    assert outcome.structure["orders"][0] == pytest.approx(truth["odd_line"]["order"], abs=0.05)

@@ -1,0 +1,114 @@
+"""The axis model against solutions that can be written down."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from ema.core.errors import ConfigError
+from ema.models import axis, axis_config
+from ema.models.axis_config import LinearAxis, RotaryAxis
+
+T = np.arange(0.0, 0.5, 1e-3)
+FREE = RotaryAxis(J=2e-5, F_d=0.0, k_t=0.05, k_e=0.03, R=0.5, L=3e-4)
+
+
+def run(plant, drive, recorded, *, effects=None, start=(0.0, 0.0), t=T, h=1e-4, **changed):
+    numbers = axis.model(plant, effects, **changed)
+    offsets = np.array([0, len(t)])
+    return axis.simulate(numbers, drive, offsets, t, np.asarray(recorded, float), np.array([start]), h)
+
+
+def test_constant_current_accelerates_evenly():
+    out = run(FREE, "current", np.full(len(T), 0.4))
+    np.testing.assert_allclose(out[1], 0.05 * 0.4 / 2e-5 * T, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(out[0], 0.5 * 0.05 * 0.4 / 2e-5 * T**2, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(out[3], 0.5 * 0.4 + 0.03 * out[1], rtol=1e-9)
+
+
+def test_voltage_step_follows_the_exact_solution_of_the_two_coupled_equations():
+    J, k_t, k_e, R, L, u = 2e-5, 0.05, 0.03, 0.5, 3e-4, 3.0
+    out = run(FREE, "voltage", np.full(len(T), u), h=2e-5)
+    A = np.array([[-R / L, -k_e / L], [k_t / J, 0.0]])
+    settled = np.array([0.0, u / k_e])
+    start = np.array([u / R, 0.0])  # the current is taken as settled where a window begins
+    exact = np.array([settled + expm(A * t) @ (start - settled) for t in T])
+    np.testing.assert_allclose(out[2], exact[:, 0], atol=0.02 * u / R)
+    np.testing.assert_allclose(out[1], exact[:, 1], atol=0.01 * u / k_e)
+
+
+def test_dry_friction_stops_a_free_axis_after_the_braking_distance_and_holds_it():
+    plant = FREE.model_copy(update={"F_d": 0.01, "F_s": 0.02})
+    out = run(plant, "current", np.full(len(T), 0.3), start=(0.0, 0.0))
+    assert not out[1].any()  # 0.015 N m is below static friction
+    out = run(plant, "current", np.zeros(len(T)), start=(0.0, 50.0))
+    assert out[1, -1] == 0.0
+    assert out[0, -1] == pytest.approx(2e-5 * 50.0**2 / (2.0 * 0.01), rel=2e-3)
+
+
+def test_viscous_drag_and_spring_give_exponential_and_oscillation():
+    out = run(FREE, "current", np.zeros(len(T)), effects={"viscous_drag": {"coefficient": 1e-4}}, start=(0.0, 10.0))
+    np.testing.assert_allclose(out[1], 10.0 * np.exp(-1e-4 / 2e-5 * T), rtol=1e-3)
+    k = 2e-5 * (2.0 * np.pi * 8.0) ** 2
+    out = run(FREE, "current", np.zeros(len(T)), effects={"spring_load": {"stiffness": k}}, start=(1.0, 0.0))
+    np.testing.assert_allclose(out[0], np.cos(2.0 * np.pi * 8.0 * T), atol=5e-3)
+
+
+def test_sensors_delay_and_resolver_error_show_in_the_outputs_only():
+    i = 0.4 * np.sin(20.0 * T)
+    plain = run(FREE, "current", i)
+    late = run(FREE, "current", i, effects={"speed_delay": {"time": 3e-3}})
+    np.testing.assert_allclose(late[1, 5:], plain[1, 2:-3], atol=1e-9)
+    np.testing.assert_array_equal(late[0], plain[0])
+    wobble = run(FREE, "current", i, effects={"resolver_error": {"once_sine": 0.01}})
+    np.testing.assert_allclose(wobble[0], plain[0] + 0.01 * np.sin(plain[0]), atol=1e-9)
+    np.testing.assert_allclose(wobble[1], plain[1] * (1.0 + 0.01 * np.cos(plain[0])), atol=1e-5 * np.ptp(plain[1]))
+
+
+def test_several_cogging_lines_add_up_in_the_holding_current():
+    lines = {
+        "cogging": {"amplitude": 0.01, "order": 18.0, "phase": 0.3},
+        "cogging#2": {"amplitude": 0.002, "order": 36.0, "phase": -1.0},
+    }
+    plant = FREE.model_copy(update={"F_d": 0.004, "F_s": 0.004})
+    theta = np.linspace(0.0, 2.0 * np.pi, 500)
+    torque = 0.01 * np.sin(18 * theta + 0.3) + 0.002 * np.sin(36 * theta - 1.0)
+    for direction in (1.0, -1.0):
+        held = axis.holding(axis.model(plant, lines), theta, np.full(500, direction), theta)
+        np.testing.assert_allclose(held * 0.05, torque + direction * 0.004, atol=1e-9)
+
+
+def test_halving_the_step_changes_nothing_that_counts():
+    i = 0.4 * np.sin(12.0 * T)
+    plant = FREE.model_copy(update={"F_d": 0.003, "F_s": 0.003})
+    coarse, fine = (run(plant, "current", i, h=h) for h in (2.5e-4, 2.5e-5))
+    assert np.max(np.abs(coarse[1] - fine[1])) < 2e-3 * np.max(np.abs(fine[1]))
+
+
+def test_linear_axis_driven_by_force():
+    plant = LinearAxis(motion="linear", M=95.0, F_d=20.0, C=200.0, drive="force")
+    t = np.arange(0.0, 4.0, 1e-3)
+    out = run(plant, "force", np.full(len(t), 60.0), t=t)
+    assert out[1, -1] == pytest.approx((60.0 - 20.0) / 200.0 * (1.0 - np.exp(-200.0 * t[-1] / 95.0)), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("kind: axis\nJ: 1e-5\nF_d: 0.01\n", "drive: current needs k_t"),
+        ("kind: axis\nJ: 1 A\nF_d: 0.01\nk_t: 0.1\n", "wrong unit"),
+        ("kind: axis\nJ: 1e-5\nF_d: 0.01\nF_s: 0.001\nk_t: 0.1\n", "must not be below"),
+        ("kind: axis\nJ: 1e-5\nF_d: 0.01\nk_t: 0.1\neffects: {rust: {depth: 1}}\n", "unknown for an axis"),
+        ("kind: axis\nJ: 1e-5\nF_d: 0.01\nk_t: 0.1\neffects: {stribeck: {depth: 1}}\n", "no parameter depth"),
+        ("kind: axis\nJ: 1e-5\nF_d: 0.01\nk_t: 0.1\nnoise: {i_z: 1}\n", "unknown channel i_z"),
+        ("kind: axis\nJ: 1e-5\nF_d: 0.01\nk_t: 0.1\nfitted: [R]\n", "no value to start from"),
+    ],
+)
+def test_wrong_plant_files_are_refused_in_one_line(tmp_path, text, said):
+    path = tmp_path / "axis.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        axis_config.load(path)
+    assert said in str(caught.value)
+    assert str(path) in str(caught.value)
