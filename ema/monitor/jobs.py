@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -34,8 +34,11 @@ class Runner:
         return self._identifiers[key].estimate(job.measurement)
 
 
-def answered(outputs: list[Output], monitor: Monitor, runner: Runner) -> Iterator[Output]:
-    """Outputs with every job done at once and replaced by its answer."""
+def answered(outputs: Iterable[Output], monitor: Monitor, runner: Runner) -> Iterator[Output]:
+    """Outputs with every job done at once and replaced by its answer.
+
+    Given `Monitor.stream`, a job is answered before the next cycle is looked at, as it is on a live bus.
+    """
     for output in outputs:
         if isinstance(output, Job):
             yield from monitor.conclude(output, runner.run(output))
@@ -46,5 +49,5 @@ def answered(outputs: list[Output], monitor: Monitor, runner: Runner) -> Iterato
 def answers(batches: Iterator[np.ndarray], monitor: Monitor, runner: Runner) -> Iterator[Output]:
     """All answers to recorded frames, in batches of any size, until they end."""
     for frames in batches:
-        yield from answered(monitor.update(frames), monitor, runner)
+        yield from answered(monitor.stream(frames), monitor, runner)
     yield from answered(monitor.finish(), monitor, runner)

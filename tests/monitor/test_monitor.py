@@ -66,6 +66,13 @@ def test_the_same_frames_give_the_same_answers_bit_for_bit(bench, fly, growing, 
     assert facts(bench.outputs(flight, slower=slower)) == facts(bench.outputs(flight, batch=batch, slower=slower))
 
 
+def test_the_size_of_batches_does_not_matter_while_the_model_is_doubted(bench, fly):
+    odd = {"n_cycles": 6, "seed": 5, "actuators": [{"effects": {"viscous_drag": {"coefficient": 2e-4}}}]}
+    whole = bench.outputs(fly(**odd), batch=5000)
+    assert any(isinstance(out, Event) for out in whole)
+    assert facts(whole) == facts(bench.outputs(fly(**odd), batch=50))
+
+
 def test_a_gap_between_the_scheduled_points_degrades_and_one_at_a_point_makes_invalid(bench, fly, growing):
     flight = fly(**growing)
     frames = np.concatenate([f for _, f in flight])
