@@ -15,6 +15,7 @@ from pathlib import Path
 JOB = Path("/run/job")
 BUS = "vcan0"
 DAEMON = f"ema-daemon@{BUS}.service"
+WORKER = f"ema-hf-worker@{BUS}.service"
 SIMULATOR = "ema-simulator.service"
 LOGS = Path(f"/var/log/ema/{BUS}")
 PATIENCE = 240  # [s]; nothing is judged by how long it takes
@@ -25,12 +26,13 @@ facts: dict = {}
 def main():
     install()
     start()
+    start_worker()
     kill()
     hang()
     take_the_interface_away()
     facts["exposure"] = run("systemd-analyze", "security", "--no-pager", DAEMON, check=False).strip().splitlines()[-1]
     (JOB / "journal.txt").write_text(
-        run("journalctl", "--no-pager", "-o", "short-monotonic", "-u", DAEMON, "-u", SIMULATOR)
+        run("journalctl", "--no-pager", "-o", "short-monotonic", "-u", DAEMON, "-u", WORKER, "-u", SIMULATOR)
     )
     (JOB / "facts.json").write_text(json.dumps(facts, indent=1))
     # The daemon is still running: the power-off that follows has to stop it, and at-shutdown copies what it leaves.
@@ -60,6 +62,13 @@ def start():
     run("systemctl", "start", SIMULATOR)
     facts["first_estimates"] = wait_for_estimates()
     facts["started"] = {**show("NRestarts", "MainPID", "MemoryCurrent", "User"), "status": status_of_main_process()}
+
+
+def start_worker():
+    say("the HF identifier in a unit of its own")
+    run("systemctl", "start", WORKER)
+    facts["hf_estimates"] = wait_for_estimates(1, "hf")
+    run("systemctl", "stop", WORKER)
 
 
 def kill():
@@ -101,8 +110,8 @@ def take_the_interface_away():
 
 def listen():
     """The independent witness: every estimate on the bus, into bus.log."""
-    estimate = json.loads((JOB / "ids.json").read_text())["estimate"]
-    words = f"exec candump -L {BUS},{estimate}:1FFFFFFF >>{JOB}/bus.log"
+    filters = ",".join(f"{identifier}:1FFFFFFF" for identifier in json.loads((JOB / "ids.json").read_text()).values())
+    words = f"exec candump -L {BUS},{filters} >>{JOB}/bus.log"
     subprocess.Popen(words, shell=True, start_new_session=True)
 
 
@@ -142,10 +151,10 @@ def wait_until_running():
     )
 
 
-def wait_for_estimates(n=2):
-    """Number of estimate frames seen on the bus from now on, at least `n`."""
+def wait_for_estimates(n=2, method="linear"):
+    """Number of estimate frames of one method seen on the bus from now on, at least `n`."""
     log = JOB / "bus.log"
-    estimate = json.loads((JOB / "ids.json").read_text())["estimate"]
+    identifier = json.loads((JOB / "ids.json").read_text())[method]
     begin = log.stat().st_size if log.exists() else 0
 
     def seen():
@@ -153,9 +162,9 @@ def wait_for_estimates(n=2):
             return 0
         with log.open("rb") as lines:
             lines.seek(begin)
-            return lines.read().count(b" " + estimate.encode() + b"##")
+            return lines.read().count(b" " + identifier.encode() + b"##")
 
-    wait(f"{n} estimates on the bus", lambda: seen() >= n)
+    wait(f"{n} {method} estimates on the bus", lambda: seen() >= n)
     return seen()
 
 

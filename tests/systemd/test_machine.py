@@ -20,6 +20,8 @@ ROOT = HERE.parents[1]
 DAEMON_YAML = """
 actuators: {0: {bundle: bundle}}
 log: {directory: /var/log/ema/vcan0, flush_interval: 1 s}
+monitor: {slower: {hf: {every: 1 s}}}
+remote: {hf: /run/ema-hf/vcan0/socket}
 """
 SCENARIO_YAML = """
 period: 1.5 s
@@ -43,8 +45,8 @@ def machine(request, coarse_bundle, tmp_path_factory):
         shutil.copy(path, job)
     (job / "daemon.yaml").write_text(DAEMON_YAML)
     (job / "scenario.yaml").write_text(SCENARIO_YAML)
-    estimate = default().messages["EstimateLinear"]
-    (job / "ids.json").write_text(json.dumps({"estimate": f"{estimate.frame_id:08X}"}))
+    ids = {method: default().messages[f"Estimate{method.capitalize()}"].frame_id for method in ("linear", "hf")}
+    (job / "ids.json").write_text(json.dumps({method: f"{identifier:08X}" for method, identifier in ids.items()}))
     (job / "at-shutdown").write_text(AT_SHUTDOWN)
     (job / "at-shutdown").chmod(0o755)
     pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
@@ -55,6 +57,9 @@ def machine(request, coarse_bundle, tmp_path_factory):
     words = [sys.executable, ROOT / "tools/on_systemd.py", "--timeout", "900", "--job", job, "python3", "scenario.py"]
     done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     (job / "transcript.txt").write_text(done.stdout)
+    kept = ROOT / "var/systemd-transcript.txt"
+    kept.parent.mkdir(exist_ok=True)
+    kept.write_text(done.stdout)
     assert done.returncode == 0, done.stdout[-6000:]
     return job
 
@@ -93,6 +98,10 @@ def test_daemon_runs_confined(facts, capsys):
 
 def test_estimates_reach_the_bus(facts):
     assert facts["first_estimates"] >= 2
+
+
+def test_hf_worker_answers_over_its_socket(facts):
+    assert facts["hf_estimates"] >= 1
 
 
 @pytest.mark.parametrize(("event", "result"), [("killed", "signal"), ("hung", "watchdog")])

@@ -11,6 +11,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 KERNEL = "linux.uml"
+LEAST_MEMORY, MOST_MEMORY = 512, 1024  # [MiB]
 OUTPUT_BEGINS, OUTPUT_ENDS = "EMA-OUTPUT-BEGINS", "EMA-OUTPUT-ENDS"  # printed by the machine around its job's output
 
 
@@ -28,7 +29,7 @@ def image(path: Path, changes: Path) -> list[str]:
     return [f"ubd0={changes},{path}", "root=/dev/ubda", "rw"]
 
 
-def boot(root: list[str], init: Path, job: Path, *, timeout: float, memory: str = "1G") -> Iterator[str]:
+def boot(root: list[str], init: Path, job: Path, *, timeout: float) -> Iterator[str]:
     """Boot, yield the console's lines as they come, return when the machine has halted.
 
     Parameters
@@ -37,16 +38,15 @@ def boot(root: list[str], init: Path, job: Path, *, timeout: float, memory: str 
     init : the machine's first process, as a path inside its root.
     job : directory of the host; the machine finds its path as EMA_JOB on the kernel's command line.
     timeout : the machine is killed after this time. [s]
-    memory : the machine's; it is taken from /dev/shm as it is used.
 
     Raises
     ------
-    MachineError : no such kernel, or the time is over.
+    MachineError : no such kernel, too little memory, or the time is over.
     """
     kernel = shutil.which(KERNEL)
     if kernel is None:
         raise MachineError(f"{KERNEL} is not installed: run tools/install_system_packages")
-    words = [f"mem={memory}", *root, f"init={init}", f"EMA_JOB={job}"]
+    words = [f"mem={_memory()}M", *root, f"init={init}", f"EMA_JOB={job}"]
     words += ["con=null", "con0=null,fd:1", "ssl=null", "quiet", f"uml_dir={job}"]
     machine = subprocess.Popen(
         [kernel, *words],
@@ -99,6 +99,14 @@ def relay(lines: Iterable[str], job: Path) -> int:
         print("\n".join(around[-40:]), file=sys.stderr)
         raise MachineError("the machine halted before the command had ended (its own lines are above)")
     return int(status.read_text())
+
+
+def _memory() -> int:
+    """The machine's memory, which it takes from /dev/shm as it uses it. [MiB]"""
+    free = shutil.disk_usage("/dev/shm").free >> 20
+    if free < LEAST_MEMORY:
+        raise MachineError(f"/dev/shm has {free} MiB, {LEAST_MEMORY} are needed (for docker: --shm-size=1100m)")
+    return min(MOST_MEMORY, free)
 
 
 def _wide_registers(job: Path) -> dict[str, str]:
