@@ -21,7 +21,7 @@ DAEMON_YAML = """
 actuators: {0: {bundle: bundle}}
 log: {directory: /var/log/ema/vcan0, flush_interval: 1 s}
 monitor: {slower: {hf: {every: 1 s}}}
-remote: {hf: /run/ema-hf/vcan0/socket}
+remote: {hf: /run/ema-hf/vcan0/hf.sock}
 """
 SCENARIO_YAML = """
 period: 1.5 s
