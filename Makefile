@@ -5,7 +5,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test test-vcan test-systemd soak wheel install uninstall check env bench lock clean
+.PHONY: demo test test-vcan test-systemd soak wheel install uninstall check env bench bench-discrepancy lock clean
 
 demo: env
 	$(BIN)/ema demo --out out/demo
@@ -36,6 +36,9 @@ check: env
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+bench-discrepancy: env
+	$(BIN)/python -m benchmarks.discrepancy
 
 bench: env
 	$(BIN)/python -m benchmarks

@@ -19,6 +19,7 @@ from .fit import Free, free
 from .plant import Point
 from .weak import Torque, bumps, lines
 
+FLAT, FLAT_SAMPLES = 5e-3, 10  # [A] samples of one cycle at the largest current that make a clipped top
 WARMER = 3.0  # [K] spread of winding temperature below which nothing can be said about temperature
 
 
@@ -150,7 +151,7 @@ def candidates(data: Measured, torques: Sequence[Torque]) -> list[Candidate]:
         found.append(_plain("magnet_flux", "per_kelvin"))
         found.append(_plain("winding_resistance", "per_kelvin"))
     top = max(float(np.abs(s.i).max()) for s in data.signals)
-    if any(int((np.abs(s.i) > top - 0.02).sum()) >= 5 for s in data.signals):
+    if any(int((np.abs(s.i) > top - FLAT).sum()) >= FLAT_SAMPLES for s in data.signals):
         found.append(_plain("adc_saturation", "limit", step={"limit": top - 30.0}))
     for order, _ in lines(torques):
         frees = (

@@ -42,6 +42,8 @@ class Measured:
         [A]
     start : array, shape (n_cycles, 2)
         θ_u and θ_m at the start. [rad]
+    holding : array, shape (n_cycles, 3)
+        Phase currents at the start, their mean taken off. [A]
     dT : array, shape (n_cycles,)
         Winding temperature less 20 °C; zero where it was not recorded. [K]
     has_temperature : bool
@@ -56,6 +58,7 @@ class Measured:
     y: list[Array]
     envelopes: list[Array]
     start: Array
+    holding: Array
     dT: Array
     has_temperature: bool
     angle_step: float
@@ -93,6 +96,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
     signals = [s for s, _ in everything]
     rest = max(1, round(AT_REST * plant.control.rate))
     start = np.array([[s.theta_u[0, :rest].mean(), s.theta_m[0, 0]] for s in signals])
+    holding = np.array([s.i[0, :, :rest].mean(axis=1) for s in signals])
     dT = np.array([cycle["temp_w"].mean() - T_20 if with_temperature else 0.0 for _, cycle in everything])
     return Measured(
         tuple(labels),
@@ -102,6 +106,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
         [stacked(features(plant, s))[0] for s in signals],
         [envelope(s.i, plant.control.rate)[0] for s in signals],
         start,
+        holding - holding.mean(axis=1, keepdims=True),
         dT,
         with_temperature,
         _step(np.concatenate([s.theta_m[0] for s in signals])),

@@ -25,6 +25,7 @@ MIN_CYCLES = 2
 WORTH_IT = 0.25  # share of what is left that a further effect must take on held-out cycles
 ENOUGH = 0.1  # share of what faults alone leave, from which effects explain it but for the form of their laws
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
+OWN_SHARE = 0.5  # of a gain that must go when the effect alone is switched off
 ALIKE = 1.6  # factor within which what two models leave is alike: laws are approximations
 SLACK = 0.1  # misfit that switching noise may make
 ENVELOPE_SETTLING = 15e-3  # [s]
@@ -70,7 +71,8 @@ def examine(
     say("switching noise")
     search = Search(ema, Noise(ema, {}), train, heldout, say)
     before = start_model(search)
-    search.noise = Noise(ema, before.fit.point)
+    if max(before.fit.point.get(name, 0.0) for name in FAULTS) > FAULT_ALARM:  # noise depends on the faults
+        search.noise = Noise(ema, before.fit.point)
     v = verdict_before = search.verdict(before)
     say(f"faults only: p = {v.p_value:.2g}, most visible: {v.loudest}")
     after = before
@@ -78,17 +80,23 @@ def examine(
     while not v.is_noise and len(after.effects) < MAX_EFFECTS:
         enough = after is not before and after.excess < ENOUGH * before.excess + SLACK
         models = search.extend(after)
-        best = models[0]
-        taken = (after.excess - best.excess) / max(after.excess, 1e-9)
-        if taken < (STRONG if enough else WORTH_IT):
+        needed = (STRONG if enough else WORTH_IT) * after.excess
+        real = [m for m in models if after.excess - m.excess >= needed and _does_it(search, m, after)]
+        if not real:
             break
-        alike.append(tuple(m.names[-1] for m in models[1:] if m.excess < ALIKE * best.excess + 0.02))
+        best = real[0]
+        alike.append(tuple(m.names[-1] for m in real[1:] if m.excess < ALIKE * best.excess + 0.02))
         after = best
         if after.excess < 1.0:
             search.noise = Noise(ema, after.fit.point)
         v = search.verdict(after)
         say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return Examination(_findings(search, before, after, v, alike), search, before, after, verdict_before, v)
+
+
+def _does_it(search: Search, model: Model, previous: Model) -> bool:
+    """Whether the gain is the effect's own, and not that of faults fitted anew."""
+    return search.owed_to_last(model) > OWN_SHARE * (previous.heldout - model.heldout)
 
 
 def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]]) -> Findings:

@@ -15,7 +15,7 @@ from .features import Array
 from .noise import Noise
 from .plant import EmaPlant, Point
 
-N_SEEDS = 16  # for a column of the Jacobian, and for the base while searching
+N_SEEDS = 10  # for a column of the Jacobian, and for the base while searching
 SEED = 1_000_000
 K_STEP = 0.03  # below, the switching noise of a difference is as large as the difference
 LENGTH = 150.0  # of a step, in standard deviations of a cycle: four times the noise of one cycle's features

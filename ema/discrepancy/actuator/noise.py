@@ -12,8 +12,8 @@ from scipy.stats import gamma
 from .features import Array
 from .plant import EmaPlant, Point
 
-N_COVARIANCE = 128
-N_NULL = 64
+N_COVARIANCE = 96
+N_NULL = 48
 SEED = 7_000_000
 FALSE_ALARMS = 0.004  # of the whole verdict; the aim is 1 %, and the null distribution is itself estimated
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ema.discrepancy.report import Picture, picture
 
-from .examine import Examination
+from .examine import Examination, settled
 from .features import GROUPS, SECTORS, Array
 from .plant import ENVELOPE_STEP, Point
 from .select import FINAL_SEED, N_FINAL
@@ -61,6 +61,8 @@ def _envelope(e: Examination, cycles: list[int], points: list[Point]) -> Picture
             mean = runs.envelopes.mean(axis=0)
             top.plot(t, mean, color=colour, lw=0.8, label=label)
             bottom.plot(t, measured - mean, color=colour, lw=0.8)
+        largest = np.abs(np.array(bottom.lines[0].get_ydata(), dtype=float)[settled(plant) : -2]).max()
+        bottom.set_ylim(-1.2 * largest, 1.2 * largest)
         top.set_title(f"held-out: {plant.data.labels[c].split(': ')[-1]}", fontsize=9)
         bottom.set_xlabel("t [s]")
     axes[0, 0].set_ylabel("envelope [A]")

@@ -15,6 +15,7 @@ from ema.core.names import FAULTS
 from ema.effects import registry
 from ema.models import hf
 from ema.models.actuator import Actuator
+from ema.models.layout import STATE
 
 from .cycles import Measured
 from .features import Array, Signals, features, floors, slices, stacked
@@ -70,6 +71,9 @@ class EmaPlant:
         start = hf.start_at(
             self.plant, d.start[cycles_, 0] + unseen, d.start[cycles_, 1] - self._angle_error(points, cycles_)
         )
+        for j, phase in enumerate("abc"):  # the current that held it before
+            for name in ("i", "lag1", "lag2"):
+                start[:, STATE.index(f"{name}_{phase}")] = d.holding[cycles_, j]
         all_features, all_envelopes = [], []
         for first in range(0, n, CHUNK):
             part = slice(first, min(first + CHUNK, n))

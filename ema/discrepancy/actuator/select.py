@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ema.core.names import FAULTS
+from ema.effects import registry
 
 from .candidates import Candidate, candidates
 from .features import Array
@@ -30,13 +31,16 @@ from .noise import Noise, Verdict, verdict
 from .plant import EmaPlant, Point
 from .weak import Torque, torque
 
-N_FINAL = 24  # seeds of a mean that is judged
+N_FINAL = 16  # seeds of a mean that is judged
 FINAL_SEED = 3_000_000
+N_GLANCE = 4  # seeds that tell a good start from a bad one
 N_PROBE = 8  # seeds of a column that only screens
 N_REFINED = 4
 WORTH_A_FIT = 0.9  # share of the squared residual a candidate may leave, to first order
 N_REFINED_AT_LEAST = 2
-FEW_FAULTS, K_LARGE = (0.3, 3.0), 0.1  # a fault of 0.1 weighs like these shares of the residual
+LOOKS_LIKE_FAULTS = 0.7  # share of an effect's columns outside what faults can do; 0.1 for flux, but for their noise
+K_SEEN = 0.01  # a fault that is there
+NEAR_NOISE = 0.05  # excess below which a fit need not go on
 MAX_EFFECTS = 3
 
 Say = Callable[[str], None]
@@ -132,45 +136,67 @@ class Search:
         own = stacked_jacobian(self.noise, f.free, f.columns, self.train)
         r = np.concatenate([f.residuals[c] for c in self.train])
         low, high = bounds(f.free, f.point)
-        faults = [j for j, p in enumerate(f.free) if p.name in FAULTS]
-        k = np.array([f.point.get(f.free[j].name, 0.0) for j in faults])
+        Q = np.linalg.qr(own[:, [j for j, p in enumerate(f.free) if p.name in FAULTS]])[0]
         ranked = []
         for c in found:
-            names = [Free(f"{c.key}/{j}", 0.0, 0.0, 1.0) for j in range(len(c.amounts))]
-            J = np.concatenate([own, stacked_jacobian(self.noise, names, self.columns, self.train)], axis=1)
+            J = self._columns(c)
             c_low, c_high = c.limits()
-            limits = np.concatenate([low, c_low]), np.concatenate([high, c_high])
-            step, promised = bounded(J, r, *limits)
-            steps = [step]
-            # the same with faults held small: where effect and faults can stand for each other, noise in the columns
-            # would leave the faults where they are
-            for share in FEW_FAULTS:
-                weight = np.sqrt(share * (promised + len(r))) / K_LARGE
-                prior = np.zeros((len(faults), J.shape[1]))
-                prior[np.arange(len(faults)), faults] = weight
-                steps.append(bounded(np.concatenate([J, prior]), np.concatenate([r, -weight * k]), *limits)[0])
-            starts = [{**moved(f.point, f.free, step[: len(f.free)]), **c.start(step[len(f.free) :])} for step in steps]
-            ranked.append(Screened(promised, c, starts))
+            step, promised = bounded(
+                np.concatenate([own, J], axis=1), r, np.concatenate([low, c_low]), np.concatenate([high, c_high])
+            )
+            start = {**moved(f.point, f.free, step[: len(f.free)]), **c.start(step[len(f.free) :])}
+            outside = float(np.linalg.norm(J - Q @ (Q.T @ J))) / max(float(np.linalg.norm(J)), 1e-300)
+            ranked.append(Screened(promised, c, start, outside))
         return sorted(ranked, key=lambda entry: entry.promised)
+
+    def owed_to_last(self, model: Model) -> float:
+        """How much of the held-out misfit comes back when the last effect is switched off and all else stays."""
+        neutral = {f.name: self.plant.neutral(f.name) for f in model.effects[-1].frees}
+        left = residuals(self.plant, self.noise, {**model.fit.point, **neutral}, self.heldout, N_FINAL, FINAL_SEED)
+        return self.noise.misfit(list(left.values()), self.heldout) - model.heldout
+
+    def _columns(self, c: Candidate) -> Array:
+        names = [Free(f"{c.key}/{j}", 0.0, 0.0, 1.0) for j in range(len(c.amounts))]
+        return stacked_jacobian(self.noise, names, self.columns, self.train)
+
+    def start_without(self, model: Model, c: Candidate, faults: Sequence[str]) -> Point:
+        """A start that takes some faults out of `model` and lets the effect alone stand for them."""
+        point = {**model.fit.point, **dict.fromkeys(faults, 0.0)}
+        left = residuals(self.plant, self.noise, point, self.train, N_GLANCE)
+        step, _ = bounded(self._columns(c), np.concatenate([left[cycle] for cycle in self.train]), *c.limits())
+        return {**point, **c.start(step)}
 
     def extend(self, model: Model) -> list[Model]:
         """The best models with one more effect, best first."""
         found = [c for c in candidates(self.plant.data, self.torques(model)) if c.effect not in model.names]
         refined: dict[str, Model] = {}
         cost = sum(float(r @ r) for r in model.fit.residuals.values())
-        for promised, c, starts in self.screen(model, found):
-            if refined and promised > WORTH_A_FIT * cost:
+        screened = self.screen(model, found)
+        for s in screened:
+            # One effect for several faults is the simpler cause, but noise in the columns would leave the faults there.
+            faults = registry()[s.candidate.effect].mistaken_for
+            seen = len(faults) > 1 and all(model.fit.point.get(name, 0.0) > K_SEEN for name in faults)
+            if seen and s.outside < LOOKS_LIKE_FAULTS and s.candidate.effect not in refined:
+                start = self.start_without(model, s.candidate, faults)
+                refined[s.candidate.effect] = self._refined(model, s, [start], 4)
+        for s in screened:
+            if refined and s.promised > WORTH_A_FIT * cost:
                 break
-            if len(refined) >= N_REFINED or (len(refined) >= N_REFINED_AT_LEAST and self._clear(refined, promised)):
+            if len(refined) >= N_REFINED or (len(refined) >= N_REFINED_AT_LEAST and self._clear(refined, s.promised)):
                 break
-            if c.effect not in refined:
-                frees = (*model.fit.free, *c.frees)
-                refined[c.effect] = self.model((*model.effects, c), frees, self._better(starts), model.fit.columns, 2)
+            if s.candidate.effect not in refined:
+                starts = [s.start, self.start_without(model, s.candidate, FAULTS)]
+                refined[s.candidate.effect] = self._refined(model, s, starts, 2)
         ranked = sorted(refined.values(), key=lambda m: m.heldout)
         for m in ranked[:2]:
-            if m.excess < 2.0 * ranked[0].excess + 0.1:
-                refined[m.names[-1]] = self.model(m.effects, m.fit.free, m.fit.point, None, 5)
+            if m.excess < 2.0 * ranked[0].excess + 0.1 and m.excess > NEAR_NOISE:
+                refined[m.names[-1]] = self.model(m.effects, m.fit.free, m.fit.point, None, 4)
         return sorted(refined.values(), key=lambda m: m.heldout)
+
+    def _refined(self, model: Model, s: Screened, starts: Sequence[Point], n_iterations: int) -> Model:
+        frees = (*model.fit.free, *s.candidate.frees)
+        start = self._better(starts)
+        return self.model((*model.effects, s.candidate), frees, start, model.fit.columns, n_iterations)
 
     def _clear(self, refined: dict[str, Model], promised: float) -> bool:
         """Whether what is left to try promises far less than what was reached."""
@@ -180,19 +206,24 @@ class Search:
     def _better(self, starts: Sequence[Point]) -> Point:
         """The start that simulates closer to the training cycles."""
 
+        if len(starts) == 1:
+            return starts[0]
+
         def cost(point: Point) -> float:
-            left = residuals(self.plant, self.noise, point, self.train)
+            left = residuals(self.plant, self.noise, point, self.train, N_GLANCE)
             return sum(float(r @ r) for r in left.values())
 
         return min(starts, key=cost)
 
 
 class Screened(NamedTuple):
-    """A candidate's promise: squared residual on training cycles to first order, and where to begin a fit."""
+    """A candidate's promise: squared residual on training cycles to first order, where to begin a fit, and which share
+    of its columns lies outside what faults can do."""
 
     promised: float
     candidate: Candidate
-    starts: Sequence[Point]
+    start: Point
+    outside: float
 
 
 def start_model(search: Search) -> Model:

@@ -1,0 +1,116 @@
+"""The blind harness at length: hide flaws by other code, find them from records alone, print the table.
+
+Resumable: every trial is a line of the results file, and a trial that is there is not run again.
+
+    python -m benchmarks.discrepancy --seeds 20 --out var/discrepancy.jsonl
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+import time
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import click
+import numpy as np
+from scipy.stats import beta
+
+from ema.core import config, resources
+from ema.core.records import Cycle, Record
+from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.examine import examine
+from ema.models.actuator import Actuator
+
+SUPPORT = Path(__file__).parents[1] / "tests" / "support"
+
+
+def support(name: str) -> ModuleType:
+    """A module of tests/support."""
+    spec = importlib.util.spec_from_file_location(name, SUPPORT / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def trial(name: str, seed: int, n_cycles: int) -> dict[str, Any]:
+    """One hidden flaw, found or not."""
+    hidden, cases = support("hidden_actuator"), support("hidden_cases")
+    values, k = cases.draw(name, seed)
+    flaws = hidden.Flaws(**values, **{f"k{j + 1}": x for j, x in enumerate(k)})
+    record = Record(tuple(Cycle(n, c) for n, c in enumerate(hidden.cycles(flaws, n_cycles, seed))))
+    plant = config.load(resources.config("actuator.yaml"), Actuator)
+    begun = time.process_time()
+    findings = examine(plant, measured(plant, [record])).findings.as_dict()
+    found = {f"{e['name']}.{p}": q["value"] for e in findings["effects"] for p, q in e["parameters"].items()}
+    errors = {p: found[p] / truth(values) - 1.0 for p, truth in cases.CASES[name].parameters.items() if p in found}
+    gain = findings["gain"]
+    return {
+        "case": name, "seed": seed, "outcome": cases.outcome(name, findings), "verdict": findings["verdict"],
+        "named": [[e["name"], *e["indistinguishable_from"]] for e in findings["effects"]], "hidden": values, "k": k,
+        "parameter_errors": errors, **gain["heldout"],
+        "err_k_before": _err_k(gain["k_before"], k), "err_k_after": _err_k(gain["k_after"], k),
+        "false_alarms": [gain["false_alarms_before"], gain["false_alarms_after"]], "cpu_s": time.process_time() - begun,
+    }  # fmt: skip
+
+
+def _err_k(found: list[float], truth: list[float]) -> float:
+    return float(np.linalg.norm(np.array(found) - truth) / np.sqrt(6.0))
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """The results by case."""
+    head = f"{'hidden':30s} {'n':>3} {'right':>5} {'set':>4} {'wrong':>5} {'missed':>6} {'param.':>7}"
+    lines = [head + "  err_i before after floor [mA]  err_k before after"]
+    for name in dict.fromkeys(row["case"] for row in rows):
+        these = [row for row in rows if row["case"] == name]
+        count = {o: sum(row["outcome"] == o for row in these) for o in ("right", "in set", "wrong", "missed")}
+        parameter = [abs(x) for row in these for x in row["parameter_errors"].values()]
+        median = {key: float(np.median([row[key] for row in these]))
+                  for key in ("err_before", "err_after", "noise_floor", "err_k_before", "err_k_after")}  # fmt: skip
+        lines.append(
+            f"{name:30s} {len(these):3d} {count['right']:5d} {count['in set']:4d} {count['wrong']:5d} "
+            f"{count['missed']:6d} {np.median(parameter) if parameter else np.nan:7.1%}  "
+            f"{1e3 * median['err_before']:12.1f} {1e3 * median['err_after']:5.1f} {1e3 * median['noise_floor']:5.1f}"
+            f"{'':7s}{median['err_k_before']:12.4f} {median['err_k_after']:.4f}"
+        )
+    alarms = [row for row in rows if row["case"] in ("none", "faults")]
+    if alarms:
+        wrong = sum(row["verdict"] != "adequate" for row in alarms)
+        high = float(beta.ppf(0.95, wrong + 1, len(alarms) - wrong)) if wrong < len(alarms) else 1.0
+        lines.append(
+            f"false alarms without an effect: {wrong} of {len(alarms)} (below {high:.1%} with 95 % confidence)"
+        )
+    return "\n".join(lines)
+
+
+@click.command()
+@click.option("--seeds", default=20, show_default=True)
+@click.option("--first", default=0, show_default=True, help="first seed")
+@click.option("--case", "only", multiple=True, help="only these (repeatable)")
+@click.option("--cycles", default=6, show_default=True, help="recorded cycles of a trial")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("var/discrepancy.jsonl"), show_default=True)
+def main(seeds: int, first: int, only: tuple[str, ...], cycles: int, out: Path) -> None:
+    """Run missing trials and print the table."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    rows = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
+    done = {(row["case"], row["seed"]) for row in rows}
+    for seed in range(first, first + seeds):
+        for name in only or support("hidden_cases").CASES:
+            if (name, seed) not in done:
+                row = trial(name, seed, cycles)
+                rows.append(row)
+                with out.open("a") as file:
+                    file.write(json.dumps(row) + "\n")
+                click.echo(f"{name} {seed}: {row['outcome']} {row['verdict']} {row['named']}", err=True)
+    click.echo(table([row for row in rows if not only or row["case"] in only]))
+
+
+if __name__ == "__main__":
+    main()

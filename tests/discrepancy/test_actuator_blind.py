@@ -1,0 +1,67 @@
+"""Hidden by other code, found from records alone: a few seeds; `make bench-discrepancy` runs them all."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import yaml
+from click.testing import CliRunner
+from ema_postflight.discrepancy import discrepancy
+
+from ema.core import config, resources
+from ema.core.csv_records import write_csv
+from ema.core.records import Cycle, Record
+from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.examine import examine
+from ema.models.actuator import Actuator
+
+
+def hide(hidden, n=3, seed=1, **flaws: float) -> Record:
+    """Three chirps of a flawed actuator."""
+    cycles = hidden.cycles(hidden.Flaws(**flaws), n, seed, motions=(hidden.chirp(),))
+    return Record(tuple(Cycle(number, channels) for number, channels in enumerate(cycles)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("k", [{}, {"k1": 0.05, "k4": 0.04}])
+def test_neither_nothing_nor_a_fault_is_an_effect(hidden, shipped_plant, k):
+    findings = examine(shipped_plant, measured(shipped_plant, [hide(hidden, **k)])).findings
+    assert findings.verdict == "adequate"
+    assert findings.effects == []
+    for j, found in enumerate(findings.gain.k_before):
+        assert found == pytest.approx(k.get(f"k{j + 1}", 0.0), abs=0.006)
+
+
+@pytest.mark.slow
+def test_magnet_flux_is_named_from_a_file_and_extends_the_plant(hidden, tmp_path):
+    """A weaker magnet reads as three shorted phases until it is named; `extended.yaml` then holds it."""
+    write_csv(hide(hidden, flux=-0.06, k1=0.03), tmp_path / "flight.csv")
+    plant = str(resources.config("actuator.yaml"))
+    out = tmp_path / "found"
+    run = CliRunner().invoke(
+        discrepancy,
+        ["--plant", plant, str(tmp_path / "flight.csv"), "--out", str(out), "--json"],
+        catch_exceptions=False,
+    )
+    assert run.exit_code == 0
+    findings = json.loads((out / "findings.json").read_text())
+    assert findings["verdict"] == "explained"
+    assert [e["name"] for e in findings["effects"]] == ["magnet_flux"]
+    assert findings["effects"][0]["parameters"]["change"]["value"] == pytest.approx(-0.06, abs=0.004)
+    assert min(findings["gain"]["k_before"][2:5]) > 0.04
+    assert max(findings["gain"]["k_after"][1:]) < 0.02
+    extended = config.load(out / "extended.yaml", Actuator)
+    assert extended.effects["magnet_flux"]["change"] == pytest.approx(-0.06, abs=0.004)
+    assert yaml.safe_load((out / "extended.yaml").read_text())["kind"] == "ema"
+    report = (out / "report.html").read_text()
+    assert "Magnet flux changed" in report
+    assert "http" not in report.replace("http-equiv", "")
+
+
+@pytest.mark.slow
+def test_a_torque_line_at_no_integer_order_is_not_called_cogging(hidden, shipped_plant):
+    findings = examine(shipped_plant, measured(shipped_plant, [hide(hidden, line=0.01, line_order=7.37)])).findings
+    assert findings.verdict == "unexplained"
+    assert findings.effects == []
+    assert findings.structure["orders"][0]["order"] == pytest.approx(7.37, abs=0.05)

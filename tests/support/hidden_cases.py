@@ -1,0 +1,154 @@
+"""What the blind harness hides: a seed draws the size of a flaw, small faults, and noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+Draw = Callable[[np.random.Generator], dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A kind of flaw: how it is drawn, which effects name it, and the library's parameters that must come out."""
+
+    draw: Draw
+    effects: tuple[str, ...] = ()
+    outside: bool = False
+    parameters: dict[str, Callable[[dict[str, float]], float]] = field(default_factory=dict)
+
+
+def _sign(rng: np.random.Generator) -> float:
+    return float(rng.choice([-1.0, 1.0]))
+
+
+def _one(name: str, low: float, high: float, *, signed: bool = False, **fixed: float) -> Draw:
+    def draw(rng: np.random.Generator) -> dict[str, float]:
+        return {name: float(rng.uniform(low, high)) * (_sign(rng) if signed else 1.0), **fixed}
+
+    return draw
+
+
+def _several(size: float, *names: str) -> Draw:
+    def draw(rng: np.random.Generator) -> dict[str, float]:
+        x = rng.standard_normal(len(names))
+        x *= size * rng.uniform(0.7, 1.5) / np.abs(x).max()
+        return dict(zip(names, x.tolist(), strict=True))
+
+    return draw
+
+
+def _cogging(rng: np.random.Generator) -> dict[str, float]:
+    return {
+        "cogging": float(rng.uniform(0.004, 0.015)),
+        "cogging_order": float(rng.choice([6, 12, 18, 24, 36])),
+        "cogging_phase": float(rng.uniform(-3.0, 3.0)),
+    }
+
+
+def _stribeck(rng: np.random.Generator) -> dict[str, float]:
+    return {"stribeck": float(rng.uniform(0.2, 0.6)), "stribeck_speed": float(rng.uniform(8.0, 30.0))}
+
+
+def _bump(rng: np.random.Generator) -> dict[str, float]:
+    centre, width = float(rng.uniform(-0.003, 0.003)), float(rng.uniform(1e-3, 3e-3))
+    return {"bump": float(rng.uniform(0.3, 1.0)), "bump_centre": centre, "bump_width": width}
+
+
+def _both(*draws: Draw) -> Draw:
+    def draw(rng: np.random.Generator) -> dict[str, float]:
+        return {name: value for one in draws for name, value in one(rng).items()}
+
+    return draw
+
+
+def _nothing(rng: np.random.Generator) -> dict[str, float]:
+    return {}
+
+
+FLUX, VISCOUS = _one("flux", -0.08, -0.03), _one("viscous", 2e-5, 1e-4)
+OFFSET = _several(0.1, "offset_a", "offset_b", "offset_c")
+CASES: dict[str, Case] = {
+    "none": Case(_nothing),
+    "faults": Case(_nothing),
+    "magnet_flux": Case(FLUX, ("magnet_flux",), parameters={"magnet_flux.change": lambda f: f["flux"]}),
+    "viscous_drag": Case(VISCOUS, ("viscous_drag",), parameters={"viscous_drag.coefficient": lambda f: f["viscous"]}),
+    "cogging": Case(_cogging, ("cogging",), parameters={"cogging.order": lambda f: f["cogging_order"],
+                                                        "cogging.amplitude": lambda f: f["cogging"]}),
+    "current_gain": Case(_several(0.02, "gain_a", "gain_b", "gain_c"), ("current_gain",),
+                         parameters={f"current_gain.gain_{j}": lambda f, j=j: f[f"gain_{j}"] for j in "abc"}),
+    "current_offset": Case(OFFSET, ("current_offset",),
+                           parameters={f"current_offset.offset_{j}": lambda f, j=j: f[f"offset_{j}"] for j in "abc"}),
+    "position_delay": Case(_one("position_delay", 3e-4, 1.5e-3), ("position_delay",),
+                           parameters={"position_delay.time": lambda f: f["position_delay"]}),
+    "speed_delay": Case(_one("speed_delay", 3e-4, 1.5e-3), ("speed_delay",),
+                        parameters={"speed_delay.time": lambda f: f["speed_delay"]}),
+    "stribeck": Case(_stribeck, ("stribeck",)),
+    "asymmetric_friction": Case(_one("asymmetry", 0.05, 0.3, signed=True), ("asymmetric_friction",),
+                                parameters={"asymmetric_friction.asymmetry": lambda f: f["asymmetry"]}),
+    "position_friction": Case(_bump, ("position_friction",)),
+    "load_friction": Case(_one("load_friction", 0.5, 3.0), ("load_friction",),
+                          parameters={"load_friction.per_torque": lambda f: f["load_friction"]}),
+    "quadratic_drag": Case(_one("quadratic", 2e-7, 1e-6), ("quadratic_drag",),
+                           parameters={"quadratic_drag.coefficient": lambda f: f["quadratic"]}),
+    "constant_load": Case(_one("load", 1.0, 6.0, signed=True), ("constant_load",),
+                          parameters={"constant_load.torque": lambda f: f["load"]}),
+    "spring_load": Case(_one("spring", 300.0, 2000.0), ("spring_load",),
+                        parameters={"spring_load.stiffness": lambda f: f["spring"]}),
+    "gear_compliance": Case(_one("compliance", 2e-5, 1e-4, user_damping=30.0), ("gear_compliance",),
+                            parameters={"gear_compliance.compliance": lambda f: f["compliance"]}),
+    "supply_sag": Case(_one("source_resistance", 0.05, 0.4), ("supply_sag",),
+                       parameters={"supply_sag.resistance": lambda f: f["source_resistance"]}),
+    "dead_time": Case(_one("dead_time", 1e-6, 3e-6), ("dead_time",),
+                      parameters={"dead_time.time": lambda f: f["dead_time"]}),
+    "saturation": Case(_one("saturation_current", 20.0, 40.0), ("saturation",)),
+    "commutation_offset": Case(_one("commutation", 0.02, 0.09, signed=True), ("commutation_offset",),
+                               parameters={"commutation_offset.angle": lambda f: f["commutation"]}),
+    "resolver_error": Case(_several(0.01, "once_cosine", "once_sine", "twice_cosine", "twice_sine"),
+                           ("resolver_error",)),
+    "clock_skew": Case(_one("clock_skew", 1e-4, 1e-3, signed=True), ("clock_skew",)),
+    "adc_saturation": Case(_one("adc_limit", 4.0, 6.0), ("adc_saturation",),
+                           parameters={"adc_saturation.limit": lambda f: f["adc_limit"]}),
+    "winding_resistance": Case(_one("resistance", 0.1, 0.4), ("winding_resistance",)),
+    "cogging + viscous_drag": Case(_both(_cogging, VISCOUS), ("cogging", "viscous_drag")),
+    "magnet_flux + current_offset": Case(_both(FLUX, OFFSET), ("magnet_flux", "current_offset")),
+    "torque line 7.37": Case(_one("line", 0.004, 0.015), outside=True),
+    "intermittent drag": Case(_one("drag", 0.005, 0.015), outside=True),
+    "dead band": Case(_one("deadband", 5e-5, 2e-4), outside=True),
+    "slow current loop": Case(_one("slew", 300.0, 1500.0), outside=True),
+    "hum on phase A": Case(_one("hum", 0.05, 0.2), outside=True),
+    "shaker": Case(_one("shaker", 0.004, 0.015), outside=True),
+    "weak leg": Case(_one("weak_leg", 0.1, 0.4), outside=True),
+}  # fmt: skip
+
+
+def draw(name: str, seed: int) -> tuple[dict[str, float], list[float]]:
+    """Values of the flaws and the fault vector of one trial."""
+    rng = np.random.default_rng([seed, *name.encode()])
+    values = CASES[name].draw(rng)
+    k = rng.uniform(0.0, 0.06, 6) * (rng.random(6) < 0.4)
+    if name == "none":
+        k[:] = 0.0
+    elif name == "faults" and not k.any():
+        k[int(rng.integers(6))] = 0.05
+    return values, k.tolist()
+
+
+def outcome(name: str, findings: dict[str, Any]) -> str:
+    """How the finder did: right, in set, wrong, missed."""
+    case = CASES[name]
+    sets = [{e["name"], *e["indistinguishable_from"]} for e in findings["effects"]]
+    named = [e["name"] for e in findings["effects"]]
+    verdict = findings["verdict"]
+    if case.outside:
+        return "missed" if verdict == "adequate" else "right" if verdict == "unexplained" and not named else "wrong"
+    if not case.effects:
+        return "right" if verdict == "adequate" else "wrong"
+    if sorted(named) == sorted(case.effects) and all(len(s) == 1 for s in sets):
+        return "right"
+    if named and all(s & set(case.effects) for s in sets):
+        return "in set" if all(any(t in s for s in sets) for t in case.effects) else "missed"
+    return "wrong" if named else "missed"
