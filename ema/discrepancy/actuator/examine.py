@@ -25,6 +25,7 @@ MIN_CYCLES = 2
 WORTH_IT = 0.25  # share of what is left that a further effect must take on held-out cycles
 ENOUGH = 0.1  # share of what faults alone leave, from which effects explain it but for the form of their laws
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
+NAMED = 0.5  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
 OWN_SHARE = 0.5  # of a gain that must go when the effect alone is switched off
 ALIKE = 1.6  # factor within which what two models leave is alike: laws are approximations
 SLACK = 0.1  # misfit that switching noise may make
@@ -116,6 +117,12 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
     kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c not in odd]
     found = [_found(search, after, c.effect, a) for c, a in kept]
+    share = 1.0 - after.excess / max(before.excess, 1e-9)
+    if verdict == "unexplained" and found and share < NAMED:
+        notes.append(
+            f"{', '.join(e.name for e in found)} would explain {share:.0%} of the rest: too little to be named"
+        )
+        found = []
     if odd:
         at = after.fit.point["cogging.order"]
         notes.append(f"a torque line at the non-integer order {at:.4g} is no cogging of this motor")
