@@ -12,7 +12,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from ema.bundle import Bundle
-from ema.identification import Identifier, Measurement, identifier
+from ema.core.status import Reason, Status
+from ema.identification import Estimate, Identifier, Measurement, identifier
 from ema.identification import lf1 as lf1_identifier
 from ema.identification.gauss_newton import GaussNewton
 from ema.identification.noise import NoiseModel
@@ -28,6 +29,21 @@ N_TEST = 100
 N_TRAIN = 400
 N_POINTS = (6, 12, 20, 30, 50, 100, 200)
 METHODS = ("textbook linear", "textbook lf1", "textbook lf2", "linear", "lf1", "lf2", "hf")
+
+
+class TextbookLinear:
+    """Eq. (3) and nothing else: QR of A, no weights, no bounds."""
+
+    def __init__(self, bundle: Bundle):
+        self.bundle = bundle
+
+    def estimate(self, measurement: Measurement) -> Estimate:
+        """Solve R k = Qᵀ Δi; no uncertainty is known."""
+        b, nan = self.bundle, np.full(6, np.nan)
+        k = np.linalg.solve(b.arrays["R"], b.arrays["Q"].T @ (measurement.i_hat - b.i0[b.schedule]))
+        return Estimate(
+            *("textbook linear", k, nan, np.full((6, 6), np.nan), np.nan, 0, np.nan, nan, Status.VALID, Reason(0))
+        )
 
 
 @dataclass(frozen=True)
@@ -60,15 +76,12 @@ class Bench:
         """Runs without fault (N_TRAIN, n_t). [A]"""
         return self.runs(np.zeros((N_TRAIN, 6)), 20)
 
-    def identifier(self, method: str) -> Callable[[np.ndarray], np.ndarray]:
-        """From an envelope at the schedule (n_omega,) to a fault vector (6,)."""
-        b = self.bundle
-        if method == "textbook linear":
-            Q, R = b.arrays["Q"], b.arrays["R"]
-            return lambda i_hat: np.linalg.solve(R, Q.T @ (i_hat - b.i0[b.schedule]))
-        plain = method.startswith("textbook")
-        made: Identifier = self._textbook(method.split()[1]) if plain else identifier(method, b)
-        return lambda i_hat: made.estimate(Measurement.complete(i_hat, np.zeros(2))).k
+    def identifier(self, method: str) -> Identifier:
+        """By name; "textbook …" are the paper's."""
+        if not method.startswith("textbook"):
+            return identifier(method, self.bundle)
+        name = method.split()[1]
+        return TextbookLinear(self.bundle) if name == "linear" else self._textbook(name)
 
     def _textbook(self, name: str) -> GaussNewton:
         """The paper's iteration: no weights, nothing known of the model's error, started at k = 0."""
@@ -124,47 +137,44 @@ def models(bench: Bench) -> dict[str, Any]:
 
 
 def identifiers(bench: Bench, method: str) -> dict[str, Any]:
-    """err_k, err_i and online time of one identifier on both test sets."""
-    b, estimate = bench.bundle, bench.identifier(method)
-    tuning, library = lf1.Tuning(*b.arrays["lf1_tuning"]), b.lf2()
+    """One identifier on both test sets: err_k, err_i, online time, coverage of its intervals, its test of fit."""
+    b, made = bench.bundle, bench.identifier(method)
     answer: dict[str, Any] = {}
     for name, (k, x) in bench.tests.items():
-        estimate(x[0][b.schedule])
+        measured = [Measurement.complete(row[b.schedule], np.zeros(2)) for row in x]
+        made.estimate(measured[0])
         begin = time.perf_counter()
-        k_hat = np.array([estimate(row[b.schedule]) for row in x])
+        estimates = [made.estimate(m) for m in measured]
         seconds = (time.perf_counter() - begin) / len(k)
-        inside = np.clip(k_hat, 0.0, 1.0)
-        if method == "hf":
-            rebuilt = bench.runs(inside, 30)
-        elif "lf1" in method:
-            rebuilt = lf1.simulate(b.plant, inside, tuning)
-        elif "lf2" in method:
-            rebuilt = library(inside)
-        else:
-            rebuilt = b.i0 + k_hat @ b.arrays["A_full"].T
+        k_hat = np.array([e.k for e in estimates])
         answer[name] = {
             "err_k": err_k(k_hat, k).tolist(),
-            "err_i": err_i(rebuilt, x).tolist(),
+            "err_i": err_i(_rebuilt(bench, method, k_hat), x).tolist(),
             "rms": np.sqrt(np.mean((k_hat - k) ** 2, axis=0)).tolist(),
             "null": float(np.median(err_k(np.zeros(6), k))),
             "time": seconds,
+            "coverage": {f"{level:g}": _coverage(estimates, k, level) for level in (0.5, 0.9, 0.95)},
+            "rejected": {f"{a:g}": float(np.mean([e.p_value < a for e in estimates])) for a in (0.001, 0.01, 0.05)},
         }
     return answer
 
 
-def coverage(bench: Bench, method: str) -> dict[str, Any]:
-    """Share of true faults within the intervals, and of sound cycles whose test of fit fails."""
-    b, made = bench.bundle, identifier(method, bench.bundle)
-    answer: dict[str, Any] = {}
-    for name, (k, x) in bench.tests.items():
-        estimates = [made.estimate(Measurement.complete(row[b.schedule], np.zeros(2))) for row in x]
-        p = np.array([e.p_value for e in estimates])
-        share = {}
-        for level in (0.5, 0.9, 0.95):
-            low, high = np.moveaxis(np.array([e.interval(level) for e in estimates]), -1, 0)
-            share[f"{level:g}"] = float(np.mean((k >= low) & (k <= high)))
-        answer[name] = {"coverage": share, "rejected": {f"{a:g}": float(np.mean(p < a)) for a in (0.001, 0.01, 0.05)}}
-    return answer
+def _rebuilt(bench: Bench, method: str, k_hat: np.ndarray) -> np.ndarray:
+    """The signal that the identifier's own model gives for its answer, shape (n, n_t). [A]"""
+    b, inside = bench.bundle, np.clip(k_hat, 0.0, 1.0)
+    if method == "hf":
+        return bench.runs(inside, 30)
+    if "lf1" in method:
+        return lf1.simulate(b.plant, inside, lf1.Tuning(*b.arrays["lf1_tuning"]))
+    if "lf2" in method:
+        return b.lf2()(inside)
+    return np.asarray(b.i0 + k_hat @ b.arrays["A_full"].T)
+
+
+def _coverage(estimates: list[Estimate], k: np.ndarray, level: float) -> float:
+    """Share of the true faults within the intervals."""
+    low, high = np.moveaxis(np.array([e.interval(level) for e in estimates]), -1, 0)
+    return float(np.mean((k >= low) & (k <= high)))
 
 
 def schedules(bench: Bench) -> dict[str, Any]:

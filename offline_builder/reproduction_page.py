@@ -81,7 +81,7 @@ def _coverage(r: dict[str, Any]) -> str:
     rows = []
     for method in ("linear", "lf2", "lf1", "hf"):
         for s in e.SETS:
-            c = r[f"coverage {method}"][s]
+            c = r[f"identifier {method}"][s]
             rows.append([method, s, *_f(c["coverage"].values(), 3), *_f(c["rejected"].values(), 3)])
     return (
         "## Uncertainty\n\nShare of true faults within the 50, 90 and 95 % intervals (600 each; chance alone ± 0.02 to "

@@ -7,6 +7,7 @@ import pkgutil
 from functools import cache
 from types import MappingProxyType
 
+from . import wide_vectors  # noqa: F401 - before anything is jitted
 from .base import HOOKS, Effect, Parameter
 
 __all__ = ["HOOKS", "Effect", "Parameter", "registry"]
