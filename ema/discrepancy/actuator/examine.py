@@ -27,7 +27,8 @@ ENOUGH = 0.1  # share of what faults alone leave, from which effects explain it 
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
 NAMED = 0.5  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
 OWN_SHARE = 0.5  # of a gain that must go when the effect alone is switched off
-ALIKE = 1.6  # factor within which what two models leave is alike: laws are approximations
+ALIKE = 0.6  # share by which two models may leave more or less and be alike: laws are approximations
+CHANCE = 0.02  # difference in misfit that seeds make
 SLACK = 0.1  # misfit that switching noise may make
 ENVELOPE_SETTLING = 15e-3  # [s]
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
@@ -86,7 +87,7 @@ def examine(
         if not real:
             break
         best = real[0]
-        alike.append(tuple(m.names[-1] for m in real[1:] if m.excess < ALIKE * best.excess + 0.02))
+        alike.append(tuple(m.names[-1] for m in real[1:] if m.heldout - best.heldout < ALIKE * best.excess + CHANCE))
         after = best
         if after.excess < 1.0:
             search.noise = Noise(ema, after.fit.point)
