@@ -45,15 +45,15 @@ def draw(out: Path, bundle: Bundle, results: dict[str, Any]) -> None:
         axis.grid(axis="y", alpha=0.3)
     figure.savefig(out / "figure2.png")
 
-    figure, axis = plt.subplots(figsize=(5.5, 3.3), layout="constrained")
     found = results["schedules"]
-    for name in found:
-        if name != "n":
-            axis.plot(found["n"], found[name], "o-", ms=4, label=name)
-    axis.set(xscale="log", xlabel="number of points n_ω", ylabel="median err_k, small set", title="Sampling schedules")
-    axis.set_xticks(found["n"], [str(n) for n in found["n"]])
-    axis.minorticks_off()
-    axis.legend(frameon=False)
-    axis.grid(alpha=0.3)
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.3), layout="constrained")
+    for axis, test in zip(axes, SETS, strict=True):
+        for name, medians in found[test].items():
+            axis.plot(found["n"], medians, "o-", ms=4, label=name)
+        axis.set(xscale="log", yscale="log", xlabel="number of points n_ω", ylabel="median err_k", title=f"{test} set")
+        axis.set_xticks(found["n"], [str(n) for n in found["n"]])
+        axis.minorticks_off()
+        axis.grid(alpha=0.3)
+    axes[0].legend(frameon=False)
     figure.savefig(out / "schedules.png")
     plt.close("all")
