@@ -98,7 +98,7 @@ CASES: dict[str, Case] = {
                           parameters={"constant_load.torque": lambda f: f["load"]}),
     "spring_load": Case(_one("spring", 300.0, 2000.0), ("spring_load",),
                         parameters={"spring_load.stiffness": lambda f: f["spring"]}),
-    "gear_compliance": Case(_one("compliance", 2e-5, 1e-4, user_damping=30.0), ("gear_compliance",),
+    "gear_compliance": Case(_one("compliance", 5e-6, 3e-5, user_damping=30.0), ("gear_compliance",),
                             parameters={"gear_compliance.compliance": lambda f: f["compliance"]}),
     "supply_sag": Case(_one("source_resistance", 0.05, 0.4), ("supply_sag",),
                        parameters={"supply_sag.resistance": lambda f: f["source_resistance"]}),
