@@ -23,14 +23,14 @@ from ema.models.actuator import Actuator
 from ema.models.lf2 import Lf2
 
 FORMAT = "ema-bundle"
-VERSION = 3
+VERSION = 4
 _LF2 = tuple(field.name for field in fields(Lf2) if field.name != "i0")
 SHAPES = {
     "i0": ("n_t",), "v1": ("n_t",), "eigenvalue_share": ("r",), "schedule": ("n_omega",), "A": ("n_omega", 6),
     "A_full": ("n_t", 6), "A_step": (6,), "Q": ("n_omega", 6), "R": (6, 6),
     "noise_switching": ("n_omega", "n_omega"), "noise_start": ("n_omega", "n_omega"), "start_B": ("n_omega", 2),
     "start_scale": (2,), "noise_sizes": ("n_levels",), "noise_linear": ("n_levels", "n_omega", "n_omega"),
-    "noise_lf2": ("n_levels", "n_omega", "n_omega"), "error_linear": (N_TERMS, "n_omega"),
+    "noise_lf2": ("n_levels", "n_omega", "n_omega"),
     "error_lf2": (N_TERMS, "n_omega"), "noise_lf1": ("n_levels", "n_omega", "n_omega"),
     "error_lf1": (N_TERMS, "n_omega"), "lf1_tuning": (2,),
     "noise_rms": ("n_t",),
@@ -86,7 +86,7 @@ class Bundle:
         """HF less the model of the identifier `method`, at the schedule."""
         return KnownError(self.arrays[f"error_{method}"])
 
-    def noise(self, method: str, known: KnownError | None = None) -> NoiseModel:
+    def noise(self, method: str) -> NoiseModel:
         """Noise model at the schedule for the identifier `method`; HF has no error of its own."""
         a = self.arrays
         return NoiseModel(
@@ -96,7 +96,6 @@ class Bundle:
             start=a["noise_start"],
             B=a["start_B"],
             start_scale=a["start_scale"],
-            known=known,
         )
 
 

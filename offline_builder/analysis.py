@@ -86,8 +86,7 @@ def analyse(
     def linear(k: np.ndarray) -> np.ndarray:
         return i0[points] + k @ A.T
 
-    known["linear"] = KnownError.fitted(k, x - linear(k), noise.KNEE)
-    levels["linear"] = noise.model_error(linear, sets, S, known["linear"])
+    levels["linear"] = noise.model_error(linear, sets, S)
     tuning = tuned(plant, i0)
 
     def lf1_at_points(k: np.ndarray) -> np.ndarray:
@@ -96,7 +95,7 @@ def analyse(
     models: dict[str, noise.Model] = {"lf2": lf2.at(points), "lf1": lf1_at_points}
     for name, model in models.items():
         known[name] = error = KnownError.fitted(k, x - model(k), noise.KNEE)
-        levels[name] = noise.model_error(noise.corrected(model, error), sets, S, None)
+        levels[name] = noise.model_error(noise.corrected(model, error), sets, S)
     sizes = [0.0, *(float(np.sqrt(np.mean(np.sum(k**2, axis=1)))) for k, _, _ in sets)]
 
     starts = plan.groups["start"]

@@ -89,7 +89,7 @@ class Bench:
         b, n = self.bundle, len(self.bundle.schedule)
         zeros = np.zeros((len(b.arrays["noise_sizes"]), 1, 1))
         noise = b.noise("linear")
-        plain = replace(noise, switching=1e-4 * np.eye(n), model_error=zeros, start=np.zeros((n, n)), known=None)
+        plain = replace(noise, switching=1e-4 * np.eye(n), model_error=zeros, start=np.zeros((n, n)))
         library, tuning = b.lf2().at(b.schedule), lf1.Tuning(*b.arrays["lf1_tuning"])
         if name == "lf2":
             return GaussNewton(name, lambda k, start: library(k), plain, lambda m: np.zeros(6))

@@ -7,7 +7,6 @@ from collections.abc import Callable
 import numpy as np
 
 from ema.identification.known_error import KnownError
-from ema.identification.noise import mean_square
 
 from .config import Builder
 from .runs import START_OFFSET, Plan
@@ -49,7 +48,7 @@ def switching(nominal: np.ndarray, sets: Sets) -> np.ndarray:
     return unbiased(shrunk(x.T @ x / (len(x) - 1), len(x)), len(x))
 
 
-def model_error(model: Model, sets: Sets, S: np.ndarray, known: KnownError | None) -> np.ndarray:
+def model_error(model: Model, sets: Sets, S: np.ndarray) -> np.ndarray:
     """M at each size, shape (1 + number of sets, n_omega, n_omega); the first, for no fault, is zero.
 
     Both runs of a pair have the model's error in common and nothing else, so M = E[e₁ e₂ᵀ]. Of its principal
@@ -59,11 +58,10 @@ def model_error(model: Model, sets: Sets, S: np.ndarray, known: KnownError | Non
     L = np.linalg.cholesky(S)
     levels = [np.zeros_like(S)]
     for k, first, second in sets:
-        q = np.ones(len(k)) if known is None else np.array([mean_square(known(x)) for x in k])
         e1, e2 = (np.linalg.solve(L, (x - model(k)).T) for x in (first, second))
-        M = (e1 / q) @ e2.T / len(k)
+        M = e1 @ e2.T / len(k)
         lam, U = np.linalg.eigh(0.5 * (M + M.T))
-        chance = np.sqrt(len(S) / len(k)) * float(np.mean(1.0 / q))
+        chance = np.sqrt(len(S) / len(k))
         rest = lam[lam <= chance]
         lam = np.where(lam > chance, lam, max(float(rest.mean()) if rest.size else 0.0, 0.0))
         energy = np.abs(np.einsum("ij,ij->j", e1, e2))  # a few large errors are worth few samples

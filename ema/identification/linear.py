@@ -51,4 +51,4 @@ class Linear:
 
 def make(bundle: Bundle) -> Linear:
     """The linear identifier of a bundle."""
-    return Linear(bundle.i0[bundle.schedule], bundle.A, bundle.noise("linear", bundle.known_error("linear")))
+    return Linear(bundle.i0[bundle.schedule], bundle.A, bundle.noise("linear"))

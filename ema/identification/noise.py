@@ -1,6 +1,6 @@
 """How much a measured envelope may differ from a model's: by switching, by the model's own error, by the start state.
 
-    Σ(k, start) = Σ_switch + q(k) M(‖k‖) + d² Σ_start
+    Σ(k, start) = Σ_switch + M(‖k‖) + d² Σ_start
 
 Σ_switch: two runs of the same actuator differ by what decides its comparators. M: covariance of the model's error for
 faults of a size, measured by the builder on held-out faults at some sizes (it follows no simple power) and interpolated
@@ -14,8 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from .known_error import KnownError
 
 D2_UNKNOWN = 4.0  # d² if nobody measured the start
 D2_MAX = 25.0
@@ -32,15 +30,13 @@ class NoiseModel:
     sizes : array, shape (m,)
         Sizes ‖k‖ at which the model's error was measured, ascending from 0. [1]
     model_error : array, shape (m, n_omega, n_omega)
-        Covariance of the model's error at these sizes, over q. [A², or 1 with a known error]
+        Covariance of the model's error at these sizes. [A²]
     start : array, shape (n_omega, n_omega)
         Covariance for a start at d = 1. [A²]
     B : array, shape (n_omega, 2)
         Linear influence of the start state: user position, gear output. [A/rad]
     start_scale : array, shape (2,)
         Start offsets for which d is 1. [rad]
-    known : KnownError or None
-        Scales `model_error` if given.
     """
 
     switching: np.ndarray
@@ -49,7 +45,6 @@ class NoiseModel:
     start: np.ndarray
     B: np.ndarray
     start_scale: np.ndarray
-    known: KnownError | None = None
 
     def start_shift(self, start: np.ndarray | None) -> np.ndarray:
         """Linear influence of the start state on the envelope, shape (n_omega,). [A]"""
@@ -58,8 +53,7 @@ class NoiseModel:
     def covariance(self, start: np.ndarray | None, k: np.ndarray) -> np.ndarray:
         """Σ for a cycle that began at `start` with faults near `k`."""
         d2 = D2_UNKNOWN if start is None else min(float(np.sum((start / self.start_scale) ** 2)), D2_MAX)
-        q = 1.0 if self.known is None else mean_square(self.known(k))
-        return self.switching + q * self._at_size(k) + d2 * self.start
+        return self.switching + self._at_size(k) + d2 * self.start
 
     def _at_size(self, k: np.ndarray) -> np.ndarray:
         s2, q = self.sizes**2, float(k @ k)
@@ -72,8 +66,3 @@ class NoiseModel:
     def beyond(self, k: np.ndarray) -> bool:
         """Whether the faults are clearly larger than any the model was measured for."""
         return bool(np.sqrt(k @ k) > 1.25 * self.sizes[-1])
-
-
-def mean_square(error: np.ndarray) -> float:
-    """Mean square over the instants, never zero. [A²]"""
-    return float(np.mean(error**2)) + 1e-12
