@@ -4,9 +4,8 @@
 
 Σ_switch: two runs of the same actuator differ by what decides its comparators. M: covariance of the model's error for
 faults of a size, measured by the builder on held-out faults at some sizes (it follows no simple power) and interpolated
-in ‖k‖². q: one; or, for a model whose known error is not taken off (`linear`), the mean square of that error at k, so
-that M only has to tell its directions. Σ_start: what is left of the start state's influence when its linear part is
-taken off; it grows with the distance d of the start from the middle of the gap at zero.
+in ‖k‖². Σ_start: what is left of the start state's influence when its linear part is taken off; it grows
+with the distance d of the start from the middle of the gap at zero.
 """
 
 from __future__ import annotations
