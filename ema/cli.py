@@ -5,6 +5,7 @@ Exit status: 0 done; 1 a negative answer or a failed check; 2 wrong use or bad i
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib.metadata import entry_points, version
 from typing import Any, NoReturn
@@ -12,6 +13,10 @@ from typing import Any, NoReturn
 import click
 
 from ema.core.errors import EmaError, NegativeAnswer
+
+# Before numpy is loaded: matrices here are small, and threads of a linear algebra library that wait for each other cost
+# a linear answer several times its own work. Cores are used by processes and kernels instead.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 class _Programs(click.Group):
