@@ -11,7 +11,7 @@ import numpy as np
 
 from .fitting import fit
 from .outcome import Gain, Outcome, RecordGain
-from .plant import Candidate, Errors, Plant
+from .plant import Candidate, Errors, Plant, Point
 from .selection import (
     Progress,
     Tried,
@@ -32,7 +32,7 @@ MAX_EFFECTS = 3
 MAX_TERMS = 3
 EXPLAINED = 1.2  # held-out residual over noise up to which a model counts as explaining the data
 LITTLE_LEFT = 0.03  # or share of the residual above noise that may be left
-MIN_EXPLAINED_SHARE = 0.5  # of the residual above noise: what explains less is not named as the cause
+MIN_EXPLAINED_SHARE = 0.5  # of the residual above noise: a cause that explains less is not trusted
 
 
 @dataclass
@@ -66,18 +66,16 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
     terms = [c for c in chosen if c.is_structure]
     share = 1.0 - above_noise(state.model) / max(above_noise(plain), 1e-12)
     notes: list[str] = []
-    if named and not explained and share < MIN_EXPLAINED_SHARE:
-        notes.append(
-            f"{', '.join(c.key for c in named)} would explain {share:.0%} of the residual: too little to be the cause"
-        )
-        named = []
+    trust = 1.0 if explained else min(1.0, share / MIN_EXPLAINED_SHARE)
+    if named and trust < 1.0:
+        notes.append(f"{', '.join(c.key for c in named)}: explain only {share:.0%} of the residual above noise")
     outcome: Any = "adequate" if verdict.is_noise else ("explained" if explained and not terms else "unexplained")
     names = [f.name for f in plant.base]
     return Outcome(
         verdict=outcome,
         because=verdict.because,
         p_value=verdict.p_value,
-        effects=_effects(plant, state, named, final.point, final.draw),
+        effects=_effects(plant, state, named, final.point, final.draw, trust),
         structure=_structure(plant, terms, final.point) if outcome == "unexplained" else {},
         train=_gain(plant, plain, state.model, held_out=False),
         heldout=_gain(plant, plain, state.model, held_out=True),
@@ -132,7 +130,8 @@ def _drop_superfluous(plant: Plant, state: _State, progress: Progress) -> None:
     while len(state.model.accepted) > 1 and k < len(state.model.accepted):
         progress(f"without {state.model.accepted[k].key}")
         models = [m[:k] + m[k + 1 :] for m in state.model.models]
-        starts = [[_without(f.point, m[k])] for f, m in zip(state.model.fits, state.model.models, strict=True)]
+        base = {f.name for f in plant.base}
+        starts = [[_without(f.point, m[k], base)] for f, m in zip(state.model.fits, state.model.models, strict=True)]
         reduced = fit_model(plant, models, starts)
         if is_worth_it(state.model, reduced):
             k += 1
@@ -145,9 +144,10 @@ def _round(progress: Progress, number: int, key: str) -> None:
     progress(f"round {number}: {key}")
 
 
-def _without(point: Any, candidate: Candidate) -> dict[str, float]:
-    names = {f.name for f in candidate.free} | {name for start in candidate.starts for name in start}
-    return {name: value for name, value in point.items() if name not in names}
+def _without(point: Point, candidate: Candidate, base: set[str]) -> Point:
+    """The point less what belongs to the candidate (a start may also propose base parameters: these stay)."""
+    own = {f.name for f in candidate.free} | {name for start in candidate.starts for name in start}
+    return {name: value for name, value in point.items() if name in base or name not in own}
 
 
 def _union(model: Tried) -> list[Candidate]:
@@ -155,7 +155,9 @@ def _union(model: Tried) -> list[Candidate]:
     return list(model.accepted)
 
 
-def _effects(plant: Plant, state: _State, named: Sequence[Candidate], point: Any, draw: Any) -> list[dict[str, Any]]:
+def _effects(
+    plant: Plant, state: _State, named: Sequence[Candidate], point: Any, draw: Any, trust: float
+) -> list[dict[str, Any]]:
     described = plant.describe(named, point, draw)
     out = []
     rounds = {name.split("/")[0]: value for name, value in reversed(state.rounds.items())}
@@ -164,7 +166,7 @@ def _effects(plant: Plant, state: _State, named: Sequence[Candidate], point: Any
         trials, before = rounds[key]
         others = alike(trials, key, before)
         weights = _weights(trials, before)
-        confidence = weights[key]
+        confidence = weights[key] * trust
         out.append(
             {
                 "name": entry.pop("name"),

@@ -18,6 +18,7 @@ ODDS = 5.0  # difference in log-likelihood (150 : 1) from which one explanation 
 NEARLY_NOISE = 1.1  # scale of a residual below which likelihoods can be taken at their word
 SIGNIFICANT = 2.5  # standard errors a mean gain must be above zero
 MIN_SHARE = 0.02  # of the residual above noise that a further effect must explain
+MIN_SHARE_OF_TERM = 0.05
 SAME_SHARE = 0.03  # explanations of a residual that none explains fully are alike within this share of the gain
 
 
@@ -204,6 +205,7 @@ def above_noise(tried: Tried) -> float:
 
 
 def is_worth_it(new: Tried, old: Tried) -> bool:
-    """A further effect must be significant and explain a share of what is not noise."""
+    """A further effect must be significant and explain a share of what is not noise; a nameless term a larger one."""
     share = (above_noise(old) - above_noise(new)) / max(above_noise(old), 1e-12)
-    return compare(new, old).is_significant and share > MIN_SHARE
+    nameless = len(new.accepted) > len(old.accepted) and new.accepted[-1].is_structure
+    return compare(new, old).is_significant and share > (MIN_SHARE_OF_TERM if nameless else MIN_SHARE)

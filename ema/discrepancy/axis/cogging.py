@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 MAX_ORDER = 240
 MAX_LINES = 8
+MIN_LINE = 0.03  # of the strongest line: weaker ones are not worth a name
 MAX_ROWS = 5000
 N_GROWTHS = 3.0  # growth of e^3 in a window
 LONGEST_WINDOW = 0.4  # [s]
@@ -115,9 +116,12 @@ def cogging_candidate(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> 
         return None
     taken = {float(name.split(":")[1].rpartition(".")[0]) for name in point if name.startswith("cogging:")}
     found = scan(weak, np.array([n for n in orders if n not in taken]))
-    if not found.orders:
+    known = [v for name, v in point.items() if name.startswith("cogging:")]
+    size = float(np.abs(np.concatenate([found.parts.ravel(), known, [0.0]])).max())
+    strong = [k for k, parts in enumerate(found.parts) if np.hypot(*parts) > MIN_LINE * size]
+    if not strong:
         return None
-    size = float(np.abs(found.parts).max())
+    found = Scan(tuple(found.orders[k] for k in strong), found.parts[strong], found.inertia)
     free, start = [], {}
     for n, (c, s) in zip(found.orders, found.parts, strict=True):
         for part, value in (("cos", c), ("sin", s)):

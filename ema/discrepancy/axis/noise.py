@@ -98,7 +98,7 @@ def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None) -> 
 
 
 def _robust_variance(r: Array) -> float:
-    """Variance by the median absolute value; by the second moment of the middle where most are zero (quantised)."""
-    mad = 1.4826 * float(np.median(np.abs(r)))
-    middle = r[np.abs(r) <= 4.0 * max(mad, float(np.quantile(np.abs(r), 0.9)))]
-    return float(np.mean(middle**2)) if middle.size else mad**2
+    """Variance without the wildest samples; by a high quantile where the tails are heavy (irregular sampling)."""
+    wide = float(np.quantile(np.abs(r), 0.95))
+    middle = r[np.abs(r) <= 2.0 * wide]
+    return max(float(np.mean(middle**2)) if middle.size else 0.0, (wide / 1.96) ** 2)
