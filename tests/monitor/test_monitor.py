@@ -212,7 +212,7 @@ def test_a_large_fault_is_not_taken_for_a_wrong_model(bench, fly):
     assert "model_in_doubt" not in [o.code for o in outputs if isinstance(o, Event)]
     assert not any(o.estimate.reasons & Reason.MODEL_IN_DOUBT for o in linear(outputs))
     asked = [o for o in outputs if isinstance(o, Identified) and o.estimate.method == "lf2"]
-    assert len(asked) > 3
+    assert asked
     assert np.median([o.estimate.k[2] for o in asked]) == pytest.approx(0.2, abs=0.03)
 
 

@@ -21,9 +21,12 @@ AT_ONCE = 10
 
 def child(directory):
     log = LogWriter(directory, {"ema.dbc": b"x" * 1000}, LogSettings(flush_interval=INTERVAL, segment_time=0.8))
+    told = os.open(directory / "last", os.O_CREAT | os.O_WRONLY)  # outlives the process, whatever the log does
     n = 0
     while True:
-        log.event({"t_ns": time.monotonic_ns(), "level": "info", "code": "n", "text": str(n), "actuator": None})
+        t_ns = time.monotonic_ns()
+        log.event({"t_ns": t_ns, "level": "info", "code": "n", "text": str(n), "actuator": None})
+        os.pwrite(told, t_ns.to_bytes(8, "little"), 0)
         n += 1
         time.sleep(0.004)
 
@@ -56,12 +59,12 @@ def main(directory, trials, seed):
             running.append((pid, place, time.monotonic() + rng.uniform(INTERVAL, 4 * INTERVAL)))
         for pid, place, moment in sorted(running, key=lambda run: run[2]):
             time.sleep(max(0.0, moment - time.monotonic()))
-            killed_ns = time.monotonic_ns()
             os.kill(pid, signal.SIGKILL)
             os.waitpid(pid, 0)
             segments += len(list(place.glob("*.mcap")))
+            logged_ns = int.from_bytes((place / "last").read_bytes(), "little")
             last_ns = survivors(place)
-            missing.append((killed_ns - last_ns) / 1e9 if last_ns is not None else float("inf"))
+            missing.append((logged_ns - last_ns) / 1e9 if last_ns is not None else float("inf"))
     print(json.dumps({"trials": len(missing), "interval": INTERVAL, "segments": segments, "missing": missing}))
 
 
