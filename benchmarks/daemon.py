@@ -61,6 +61,8 @@ def run(folder: Path, bundle: Path, n_actuators: int, n_cycles: int) -> None:
             daemon = subprocess.Popen([EMA, "daemon", "--config", daemon_yaml], env=environment, stderr=said)
         first_beat = 0
         while not first_beat:
+            if daemon.poll() is not None:
+                raise SystemExit(f"the daemon does not start: {(folder / 'said.txt').read_text().strip()}")
             frames = port.read(1.0)
             first_beat = int(frames["t_ns"][0]) if frames.size else 0
         before = figures(daemon.pid), time.monotonic()

@@ -54,13 +54,15 @@ def read(files: Files) -> Flight:
 def table(flight: Flight) -> Table:
     """True against estimated faults over time, those that grow, for the terminal."""
     shown = np.flatnonzero(flight.k.max(axis=0) > 0).tolist()
-    out = Table(title="true and estimated faults", caption="linear: every cycle; lf2: every other second")
+    out = Table(title="true and estimated faults", caption="cycles that both looked at; linear sees all")
     out.add_column("cycle", justify="right")
     for n in shown:
         for kind in ("true", "linear", "lf2"):
             out.add_column(f"{FAULTS[n]}\n{kind}", justify="right")
     out.add_column("linear is", no_wrap=True)
-    for row in np.unique(np.linspace(0, len(flight.cycle) - 1, N_ROWS).round().astype(int)):
+    both = np.flatnonzero(np.isin(flight.cycle, list(flight.estimates["lf2"])))
+    candidates = both if both.size else np.arange(len(flight.cycle))
+    for row in candidates[np.unique(np.linspace(0, len(candidates) - 1, N_ROWS).round().astype(int))]:
         cycle = int(flight.cycle[row])
         linear, lf2 = flight.estimates["linear"].get(cycle), flight.estimates["lf2"].get(cycle)
         cells = [str(cycle)]
