@@ -11,6 +11,7 @@ from ema.discrepancy.plant import Candidate, Point
 from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
+from .cogging import MIN_LINE
 from .naming import numbers_of
 
 if TYPE_CHECKING:
@@ -30,7 +31,10 @@ def effects(plant: AxisPlant, found: Sequence[Candidate], point: Point, drawn: S
         effect = registry()[candidate.effect]
         names = {f.name for f in candidate.free}
         mine = numbers_of({name: value for name, value in point.items() if name in names})
+        strongest = max((v.get("amplitude", 0.0) for v in own.effects.values()), default=0.0)
         for values in mine.effects.values():
+            if effect.name == "cogging" and values["amplitude"] < MIN_LINE * strongest:
+                continue
             key = _key(own.effects, values)
             unit = {p.name: p.unit for p in effect.parameters}
             parameters = {}
