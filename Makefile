@@ -39,6 +39,7 @@ check: env
 
 bench-discrepancy: env
 	$(BIN)/python -m benchmarks.discrepancy
+	$(BIN)/python -m benchmarks.discrepancy_axis
 
 bench: env
 	$(BIN)/python -m benchmarks
