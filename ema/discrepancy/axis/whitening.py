@@ -76,6 +76,19 @@ def joined(filters: Sequence[Filter]) -> Filter:
     return Filter(gain, rms, filters[0].H, dt, filters[0].damping, begin)
 
 
+@njit(inline="always")
+def _propagated(p00, p01, p11, process, h, damping):
+    """Covariance of position and speed one step `h` later, under an acceleration noise of rms `process`."""
+    a = np.exp(-damping * h)
+    b = (1.0 - a) / damping if damping > 0.0 else h
+    q = process**2
+    return (
+        p00 + 2.0 * b * p01 + b * b * p11 + 0.25 * q * h**4,
+        a * p01 + a * b * p11 + 0.5 * q * h**3,
+        a * a * p11 + q * h * h,
+    )
+
+
 @njit(cache=True)
 def _design(H, noise, process, dt, P, damping, gain, rms):
     p00, p01, p11 = P[0, 0], P[0, 1], P[1, 1]
@@ -87,15 +100,7 @@ def _design(H, noise, process, dt, P, damping, gain, rms):
             gain[k, c, 0], gain[k, c, 1] = g0 / s, g1 / s
             rms[k, c] = s**0.5
             p00, p01, p11 = p00 - g0 * g0 / s, p01 - g0 * g1 / s, p11 - g1 * g1 / s
-        h = dt[k]
-        a = np.exp(-damping * h)
-        b = (1.0 - a) / damping if damping > 0.0 else h
-        q = process[k] ** 2
-        p00, p01, p11 = (
-            p00 + 2.0 * b * p01 + b * b * p11 + 0.25 * q * h**4,
-            a * p01 + a * b * p11 + 0.5 * q * h**3,
-            a * a * p11 + q * h * h,
-        )
+        p00, p01, p11 = _propagated(p00, p01, p11, process[k], dt[k], damping)
 
 
 @njit(cache=True, fastmath=True, nogil=True)
@@ -123,12 +128,4 @@ def open_loop_variance(H, noise, process, dt, start, damping, out):
         for c in range(noise.shape[0]):
             h0, h1 = H[c, 0], H[c, 1]
             out[c, k] = h0 * h0 * p00 + 2.0 * h0 * h1 * p01 + h1 * h1 * p11 + noise[c, k] ** 2
-        h = dt[k]
-        a = np.exp(-damping * h)
-        b = (1.0 - a) / damping if damping > 0.0 else h
-        q = process[k] ** 2
-        p00, p01, p11 = (
-            p00 + 2.0 * b * p01 + b * b * p11 + 0.25 * q * h**4,
-            a * p01 + a * b * p11 + 0.5 * q * h**3,
-            a * a * p11 + q * h * h,
-        )
+        p00, p01, p11 = _propagated(p00, p01, p11, process[k], dt[k], damping)
