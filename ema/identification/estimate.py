@@ -47,8 +47,5 @@ class Estimate:
     unseparable: tuple[np.ndarray, ...] = ()
 
     def interval(self, level: float) -> np.ndarray:
-        """Limits between which each fault lies with probability `level`, shape (6, 2); NaN without an estimate."""
-        if self.marginals is None:
-            return np.full((len(self.k), 2), np.nan)
-        tail = 0.5 * (1.0 - level)
-        return np.column_stack([self.marginals.quantile(tail), self.marginals.quantile(1.0 - tail)])
+        """Shortest intervals that hold each fault with probability `level`, shape (6, 2); NaN without an estimate."""
+        return np.full((len(self.k), 2), np.nan) if self.marginals is None else self.marginals.shortest(level)

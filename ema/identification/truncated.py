@@ -11,6 +11,7 @@ References
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ from scipy.special import ndtr, ndtri
 
 FAR = 6.0  # standard deviations from which on a bound does not count
 _TAIL = 30.0  # in standard deviations; beyond it the normal distribution is out of floating-point numbers
+CONVERGED = 1e-5  # change of a factor's precision and mean, in units of the element's own
+_SQRT_HALF, _PHI_0 = math.sqrt(0.5), 1.0 / math.sqrt(2.0 * math.pi)
 
 
 class Marginals(NamedTuple):
@@ -36,39 +39,75 @@ class Marginals(NamedTuple):
         z = ndtri(np.maximum(ndtr(low) + q * (ndtr(high) - ndtr(low)), 1e-300))
         return np.clip(self.m + self.s * np.where(mirrored, -z, z), 0.0, 1.0)
 
+    def shortest(self, p: float) -> np.ndarray:
+        """Limits of the shortest interval that holds the element with probability `p`, shape (m, 2).
+
+        Near a bound it reaches the bound: a fault that is not there lies within. (An interval with equal tails never
+        holds it.)
+        """
+        a, b = _standard_bounds(self.m, self.s)
+        half = ndtri(0.5 + 0.5 * p * (ndtr(b) - ndtr(a)))
+        inside, lower = half <= np.minimum(-a, b), self.m < 0.5
+        low = np.where(inside, self.m - self.s * half, np.where(lower, 0.0, self.quantile(1.0 - p)))
+        high = np.where(inside, self.m + self.s * half, np.where(lower, self.quantile(p), 1.0))
+        return np.column_stack([low, high])
+
 
 def in_unit_box(x: np.ndarray, C: np.ndarray, n_sweeps: int = 30) -> Marginals:
-    """Marginals of N(x, C), x (6,), C (6, 6), truncated to 0 ≤ k ≤ 1."""
-    sd = np.sqrt(np.diag(C))
-    if (x > FAR * sd).all() and (1.0 - x > FAR * sd).all():
-        return Marginals(x, sd, x, sd**2)
-    precision = np.linalg.inv(C)
-    tau, nu = np.zeros(len(x)), np.zeros(len(x))
+    """Marginals of N(x, C), x (m,), C (m, m), truncated to 0 ≤ k ≤ 1.
+
+    One element's pair of bounds after the other, each a rank-one update; elements that stay far from their bounds get
+    no factor and move only by their correlation with those that have one.
+    """
+    m = len(x)
+    mu, S = x.astype(float), C.astype(float)
+    tau, nu = [0.0] * m, [0.0] * m
     for _ in range(n_sweeps):
-        S = np.linalg.inv(precision + np.diag(tau))
-        mu = S @ (precision @ x + nu)
-        s2 = np.diag(S)
-        cavity_s2 = 1.0 / np.maximum(1.0 / s2 - tau, 1e-12 / s2)
-        cavity_m = cavity_s2 * (mu / s2 - nu)
-        mean, variance = _moments(cavity_m, np.sqrt(cavity_s2))
-        tau_next = np.maximum(1.0 / variance - 1.0 / cavity_s2, 0.0)
-        nu_next = mean / variance - cavity_m / cavity_s2
-        change = np.max(np.abs(tau_next - tau) * s2)
-        tau, nu = 0.5 * (tau + tau_next), 0.5 * (nu + nu_next)  # damped: all sites are updated at once
-        if change < 1e-4:
+        change = 0.0
+        for j in range(m):
+            mean_j, s2 = float(mu[j]), float(S[j, j])
+            if tau[j] == 0.0 and FAR * math.sqrt(s2) < min(mean_j, 1.0 - mean_j):
+                continue
+            cavity_s2, cavity_m = _without(mean_j, s2, tau[j], nu[j])
+            mean, variance = _moments(cavity_m, math.sqrt(cavity_s2))
+            tau_next = max(1.0 / variance - 1.0 / cavity_s2, 0.0)
+            d_tau, d_nu = tau_next - tau[j], mean / variance - cavity_m / cavity_s2 - nu[j]
+            column = S[:, j].copy()
+            mu += column * ((d_nu - d_tau * mean_j) / (1.0 + d_tau * s2))
+            S -= (column * (d_tau / (1.0 + d_tau * s2)))[:, None] * column
+            tau[j] += d_tau
+            nu[j] += d_nu
+            change = max(change, abs(d_tau) * s2, abs(d_nu - d_tau * mean_j) * math.sqrt(s2))
+        if change < CONVERGED:
             break
-    return Marginals(cavity_m, np.sqrt(cavity_s2), mean, variance)
+    if not any(tau):
+        return Marginals(x, np.sqrt(np.diag(C)), x, np.diag(C))
+    free = [_without(float(mu[j]), float(S[j, j]), tau[j], nu[j]) for j in range(m)]
+    own = [_moments(m_j, math.sqrt(s2)) for s2, m_j in free]
+    s2, m_ = np.array(free).T
+    return Marginals(m_, np.sqrt(s2), *np.array(own).T)
+
+
+def _without(mean: float, s2: float, tau: float, nu: float) -> tuple[float, float]:
+    """Variance and mean of an element without its own bounds' factor."""
+    cavity_s2 = 1.0 / max(1.0 / s2 - tau, 1e-12 / s2)
+    return cavity_s2, cavity_s2 * (mean / s2 - nu)
 
 
 def _standard_bounds(m: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.clip(-m / s, -_TAIL, _TAIL), np.clip((1.0 - m) / s, -_TAIL, _TAIL)
 
 
-def _moments(m: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _upper(z: float) -> float:
+    """Probability of a standard normal number above z."""
+    return 0.5 * math.erfc(z * _SQRT_HALF)
+
+
+def _moments(m: float, s: float) -> tuple[float, float]:
     """Mean and variance of N(m, s²) truncated to 0…1."""
-    a, b = _standard_bounds(m, s)
-    Z = np.maximum(np.where(a > 0, ndtr(-a) - ndtr(-b), ndtr(b) - ndtr(a)), 1e-200)
-    phi_a, phi_b = (np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi) for z in (a, b))
+    a, b = max(min(-m / s, _TAIL), -_TAIL), max(min((1.0 - m) / s, _TAIL), -_TAIL)
+    Z = max(_upper(a) - _upper(b) if a > 0 else _upper(-b) - _upper(-a), 1e-200)
+    phi_a, phi_b = (math.exp(-0.5 * z * z) * _PHI_0 for z in (a, b))
     shift = (phi_a - phi_b) / Z
-    variance = s**2 * np.clip(1.0 + (a * phi_a - b * phi_b) / Z - shift**2, 1e-4, 1.0)
-    return np.clip(m + s * shift, 0.0, 1.0), variance
+    variance = s * s * min(max(1.0 + (a * phi_a - b * phi_b) / Z - shift * shift, 1e-4), 1.0)
+    return min(max(m + s * shift, 0.0), 1.0), variance

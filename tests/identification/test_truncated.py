@@ -33,6 +33,35 @@ def test_moments_and_quantiles_are_those_of_samples_within_the_box(seed):
         assert np.all(np.abs(m.quantile(p) - np.quantile(samples, p, axis=0)) < 0.15 * sd)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_shortest_interval_holds_its_share_and_none_is_shorter(seed):
+    rng = np.random.default_rng(seed)
+    m = in_unit_box(rng.choice([-0.03, 0.0, 0.01, 0.5, 0.99, 1.02], 6), correlated(seed))
+    for p in (0.5, 0.9, 0.95):
+        low, high = m.shortest(p).T
+        below = np.linspace(0.0, 1.0 - p, 201)[:, None]
+        others = np.array([m.quantile(x + p) - m.quantile(x) for x in below[:, 0]])
+        assert np.allclose(high - low, others.min(axis=0), rtol=5e-3)
+        assert ((low >= 0) & (high <= 1)).all()
+
+
+def test_an_absent_fault_lies_within_its_interval():
+    m = in_unit_box(np.array([-0.01, 0.0, 0.001, 0.5, 0.5, 1.01]), 1e-4 * np.eye(6))
+    low, high = m.shortest(0.9).T
+    assert (low[:3] == 0).all()
+    assert high[5] == 1
+
+
+def test_a_bound_moves_what_is_correlated_with_it():
+    """Element 1 is ten standard deviations inside, but goes with element 0, which lies eight outside."""
+    C = 1e-4 * np.array([[1.0, -0.9], [-0.9, 1.0]])
+    m = in_unit_box(np.array([-0.08, 0.1]), C)
+    rng = np.random.default_rng(1)
+    outside = rng.exponential(1e-2 / 8.0, 100_000)  # element 0 within the box, nearly; then element 1 given that
+    given = 0.1 - 0.9 * (outside + 0.08) + 1e-2 * np.sqrt(1.0 - 0.9**2) * rng.standard_normal(100_000)
+    assert m.mean[1] == pytest.approx(given[given > 0].mean(), abs=5e-4)
+
+
 def test_far_from_the_bounds_nothing_changes():
     C, x = correlated(9), np.full(6, 0.5)
     m = in_unit_box(x, C)
