@@ -21,14 +21,15 @@ def identify(bundle: Path, method: str, as_json: bool, records: tuple[Path, ...]
     """Estimate the fault vector of every cycle of the records.
 
     With the channels theta_u and theta_m the start state of a cycle is measured, else it is left open and the
-    uncertainty grows. Exit status 1 if no cycle gave an estimate.
+    uncertainty grows. A cycle that is not the bundle's test is said and left out. Exit status 1 if no cycle gave an
+    estimate.
 
     \b
     Example:
       ema identify --bundle bundle --method lf2 cycles.csv --json
     """
     import ema.bundle
-    from ema.core.errors import NegativeAnswer
+    from ema.core.errors import NegativeAnswer, RecordError
     from ema.core.records import read_record
     from ema.core.status import Status
     from ema.identification import identifier
@@ -39,13 +40,15 @@ def identify(bundle: Path, method: str, as_json: bool, records: tuple[Path, ...]
     estimator = identifier(method, made)
     answers: list[dict[str, Any]] = []
     for record, measured in sets:
-        estimates = [estimator.estimate(m) for m in measured]
-        numbers = [cycle.number for cycle in record]
+        cycles = [
+            _refused(cycle.number, m) if isinstance(m, RecordError) else _answer(cycle.number, estimator.estimate(m))
+            for cycle, m in zip(record, measured, strict=True)
+        ]
         answers.append(
             {
                 "record": record.name,
                 "missing_channels": list(missing(record)),
-                "cycles": [_answer(n, e) for n, e in zip(numbers, estimates, strict=True)],
+                "cycles": cycles,
             }
         )
     if as_json:
@@ -74,6 +77,12 @@ def _answer(number: int, e: Any) -> dict[str, Any]:
     }
 
 
+def _refused(number: int, why: Exception) -> dict[str, Any]:
+    from ema.core.status import Status
+
+    return {"cycle": number, "status": Status.NOT_ESTIMATED.name.lower(), "reasons": [], "refused": str(why)}
+
+
 def _finite(values: Any) -> list[float | None]:
     """Numbers for JSON, which knows no NaN."""
     return [float(v) if v == v else None for v in values]
@@ -88,7 +97,7 @@ def _say(answer: dict[str, Any]) -> None:
     click.echo("  cycle  " + "".join(f"{fault:^17}" for fault in FAULTS) + "  p-value  status")
     for c in answer["cycles"]:
         if c["status"] == "not_estimated":
-            click.echo(f"  {c['cycle']:>5}  not estimated: {', '.join(c['reasons'])}")
+            click.echo(f"  {c['cycle']:>5}  not estimated: {c.get('refused') or ', '.join(c['reasons'])}")
             continue
         values = "".join(f" {k:.4f} ± {sd:.4f} " for k, sd in zip(c["k"], c["sd"], strict=True))
         reasons = f" ({', '.join(c['reasons'])})" if c["reasons"] else ""

@@ -13,12 +13,12 @@ from ema.bus.protection import Counts
 from ema.core.errors import ConfigError
 from ema.core.status import Reason, Status
 from ema.identification import METHODS, Estimate, identifier
+from ema.identification.sampling import Sampler
 
 from .assembler import Assembler
 from .cycles import AssembledCycle
 from .doubt import ModelDoubt
 from .outputs import Event, Identified, Job, Level, Output, SampledEnvelope
-from .sampling import Sampler
 from .settings import MonitorSettings
 
 FIRST = "linear"  # the identifier of every cycle
@@ -99,9 +99,10 @@ class Monitor:
 
     def _answer(self, cycle: AssembledCycle) -> Iterator[Output]:
         channel = self._channels[cycle.actuator]
-        measurement = channel.sampler.measurement(cycle)
+        motion = cycle.motion
+        measurement = channel.sampler.measurement(cycle.i, cycle.missing, motion["theta_u"][0], motion["theta_m"][0])
         reasons = cycle.reasons
-        if channel.sampler.saturated(cycle):
+        if channel.sampler.saturated(cycle.i):
             reasons |= Reason.SATURATED
         job = Job(cycle.t_ns, cycle.actuator, cycle.span.cycle, FIRST, measurement, reasons)
         estimate = channel.identifier.estimate(measurement)

@@ -79,3 +79,18 @@ def test_a_record_of_something_else_is_refused(coarse_bundle, cycle, tmp_path, c
     with pytest.raises(RecordError, match=says) as error:
         run(coarse_bundle, written(tmp_path, change(cycle)))
     assert "\n" not in str(error.value)
+
+
+def test_a_cycle_of_another_motion_is_said_and_the_others_are_identified(coarse_bundle, cycle, tmp_path):
+    path = written(tmp_path, cycle, {**cycle, "theta_cmd": -cycle["theta_cmd"]})
+    good, other = json.loads(run(coarse_bundle, path, "--json").stdout)["records"][0]["cycles"]
+    assert good["status"] == "valid"
+    assert other["status"] == "not_estimated"
+    assert "cycle 1: theta_cmd is not the test motion" in other["refused"]
+    assert "not estimated: " in run(coarse_bundle, path).stdout
+
+
+def test_a_recorder_that_ends_one_sample_early_costs_nothing(coarse_bundle, cycle, tmp_path):
+    path = written(tmp_path, {name: x[:5000] for name, x in cycle.items()}, cycle)
+    short, whole = json.loads(run(coarse_bundle, path, "--json").stdout)["records"][0]["cycles"]
+    assert np.abs(np.array(short["k"]) - whole["k"]).max() < 0.2 * max(whole["sd"])
