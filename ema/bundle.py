@@ -23,15 +23,15 @@ from ema.models.actuator import Actuator
 from ema.models.lf2 import Lf2
 
 FORMAT = "ema-bundle"
-VERSION = 4
+VERSION = 5
 _LF2 = tuple(field.name for field in fields(Lf2) if field.name != "i0")
 SHAPES = {
     "i0": ("n_t",), "v1": ("n_t",), "eigenvalue_share": ("r",), "schedule": ("n_omega",), "A": ("n_omega", 6),
     "A_full": ("n_t", 6), "A_step": (6,), "Q": ("n_omega", 6), "R": (6, 6),
     "noise_switching": ("n_omega", "n_omega"), "noise_start": ("n_omega", "n_omega"), "start_B": ("n_omega", 2),
-    "start_scale": (2,), "noise_sizes": ("n_levels",), "noise_linear": ("n_levels", "n_omega", "n_omega"),
-    "noise_lf2": ("n_levels", "n_omega", "n_omega"),
-    "error_lf2": (N_TERMS, "n_omega"), "noise_lf1": ("n_levels", "n_omega", "n_omega"),
+    "start_scale": (2,), "noise_sizes": ("n_levels",), "noise_spreads": (2,),
+    "noise_linear": (2, "n_levels", "n_omega", "n_omega"), "noise_lf2": (2, "n_levels", "n_omega", "n_omega"),
+    "error_lf2": (N_TERMS, "n_omega"), "noise_lf1": (2, "n_levels", "n_omega", "n_omega"),
     "error_lf1": (N_TERMS, "n_omega"), "lf1_tuning": (2,),
     "noise_rms": ("n_t",),
     "i_SF": ("n_t",), "i_PH": (3, "n_t"), "f1": ("n_f1",), "f2": ("n_f2",),
@@ -92,7 +92,8 @@ class Bundle:
         return NoiseModel(
             switching=a["noise_switching"],
             sizes=a["noise_sizes"],
-            model_error=a.get(f"noise_{method}", np.zeros((len(a["noise_sizes"]), 1, 1))),
+            spreads=a["noise_spreads"],
+            model_error=a.get(f"noise_{method}", np.zeros((2, len(a["noise_sizes"]), 1, 1))),
             start=a["noise_start"],
             B=a["start_B"],
             start_scale=a["start_scale"],

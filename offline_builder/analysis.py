@@ -96,7 +96,7 @@ def analyse(
     for name, model in models.items():
         known[name] = error = KnownError.fitted(k, x - model(k), noise.KNEE)
         levels[name] = noise.model_error(noise.corrected(model, error), sets, S)
-    sizes = [0.0, *(float(np.sqrt(np.mean(np.sum(k**2, axis=1)))) for k, _, _ in sets)]
+    sizes = [float(np.sqrt(np.mean(np.sum(k**2, axis=1)))) for k, _, _ in sets]
 
     starts = plan.groups["start"]
     s = np.column_stack([plan.start[starts, THETA_U], plan.start[starts, THETA_M] / plant.transmission.GR])
@@ -107,7 +107,7 @@ def analyse(
         "i0": i0, "noise_rms": noise_rms, "A_full": A_full, "A": A, "A_step": steps, "Q": Q, "R": R,
         "v1": modes.v[:, 0], "eigenvalue_share": modes.share, "schedule": points.astype(np.int64),
         "noise_switching": S, "noise_start": start_rest, "start_B": B, "start_scale": scale,
-        "noise_sizes": np.array(sizes), "lf1_tuning": tuning.as_array(),
+        "noise_sizes": np.array(sizes), "noise_spreads": noise.spreads(sets), "lf1_tuning": tuning.as_array(),
         **{f"noise_{name}": level for name, level in levels.items()},
         **{f"error_{name}": error.coefficients for name, error in known.items()},
         **{name: getattr(lf2, name) for name in Lf2.__dataclass_fields__ if name != "i0"},

@@ -21,7 +21,7 @@ class Heldout(Settings):
     """Faults that no model is fitted to, each run twice: how far models are from the truth, by size of the faults."""
 
     n: int = Field(ge=20, le=100_000, description="fault vectors for each k_max")
-    k_max: list[float] = Field(min_length=1, max_length=20, description="largest fault drawn, ascending")
+    k_max: list[float] = Field(min_length=2, max_length=20, description="largest fault drawn, ascending")
 
 
 class Jacobian(Settings):

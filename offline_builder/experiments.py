@@ -87,7 +87,7 @@ class Bench:
     def _textbook(self, name: str) -> GaussNewton:
         """The paper's iteration: no weights, nothing known of the model's error, started at k = 0."""
         b, n = self.bundle, len(self.bundle.schedule)
-        zeros = np.zeros((len(b.arrays["noise_sizes"]), 1, 1))
+        zeros = np.zeros((2, len(b.arrays["noise_sizes"]), 1, 1))
         noise = b.noise("linear")
         plain = replace(noise, switching=1e-4 * np.eye(n), model_error=zeros, start=np.zeros((n, n)))
         library, tuning = b.lf2().at(b.schedule), lf1.Tuning(*b.arrays["lf1_tuning"])

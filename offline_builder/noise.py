@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ema.identification.known_error import KnownError
+from ema.identification.noise import spread
 
 from .config import Builder
 from .runs import START_OFFSET, Plan
@@ -49,25 +50,39 @@ def switching(nominal: np.ndarray, sets: Sets) -> np.ndarray:
 
 
 def model_error(model: Model, sets: Sets, S: np.ndarray) -> np.ndarray:
-    """M at each size, shape (1 + number of sets, n_omega, n_omega); the first, for no fault, is zero.
+    """M at each size for few and for many faults, shape (2, number of sets, n_omega, n_omega)."""
+    return np.array([[_model_error(model, *pairs, S) for pairs in half] for half in halves(sets)])
+
+
+def spreads(sets: Sets) -> np.ndarray:
+    """Mean spread of few and of many faults, shape (2,)."""
+    return np.array([np.mean([spread(k).mean() for k, _, _ in half]) for half in halves(sets)])
+
+
+def halves(sets: Sets) -> tuple[Sets, Sets]:
+    """The sets' second halves, with few faults, and their first, with many; see `runs.heldout_faults`."""
+    n = len(sets[0][0]) // 2
+    return [(k[n:], a[n:], b[n:]) for k, a, b in sets], [(k[:n], a[:n], b[:n]) for k, a, b in sets]
+
+
+def _model_error(model: Model, k: np.ndarray, first: np.ndarray, second: np.ndarray, S: np.ndarray) -> np.ndarray:
+    """Covariance of the model's error over fault vectors `k` (n, 6), each run twice, shape (n_omega, n_omega).
 
     Both runs of a pair have the model's error in common and nothing else, so M = E[e₁ e₂ᵀ]. Of its principal
     directions, measured against the switching covariance `S`, those are kept that stand above what chance puts there;
-    the others get their mean, in which chance cancels.
+    the others get their mean, in which chance cancels. For weights to be right on average, what is kept counts a
+    little more, as a covariance from few samples must (Hartlap et al., A&A 464 (2007) 399).
     """
     L = np.linalg.cholesky(S)
-    levels = [np.zeros_like(S)]
-    for k, first, second in sets:
-        e1, e2 = (np.linalg.solve(L, (x - model(k)).T) for x in (first, second))
-        M = e1 @ e2.T / len(k)
-        lam, U = np.linalg.eigh(0.5 * (M + M.T))
-        chance = np.sqrt(len(S) / len(k))
-        rest = lam[lam <= chance]
-        lam = np.where(lam > chance, lam, max(float(rest.mean()) if rest.size else 0.0, 0.0))
-        energy = np.abs(np.einsum("ij,ij->j", e1, e2))  # a few large errors are worth few samples
-        n = float(energy.sum() ** 2 / np.sum(energy**2))
-        levels.append(unbiased(L @ (U * lam) @ U.T @ L.T, n))
-    return np.array(levels)
+    e1, e2 = (np.linalg.solve(L, (x - model(k)).T) for x in (first, second))
+    M = e1 @ e2.T / len(k)
+    lam, U = np.linalg.eigh(0.5 * (M + M.T))
+    chance = np.sqrt(len(S) / len(k))
+    rest = lam[lam <= chance]
+    kept = lam > chance
+    inflation = len(k) / max(len(k) - kept.sum() - 2, 0.4 * len(k))
+    lam = np.where(kept, inflation * lam, max(float(rest.mean()) if rest.size else 0.0, 0.0))
+    return np.asarray(L @ (U * lam) @ U.T @ L.T)
 
 
 def start_influence(x: np.ndarray, s: np.ndarray, S: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -65,25 +65,38 @@ def latin_hypercube(n: int, k_max: float, seed: int) -> np.ndarray:
 
 
 def scaled_hypercube(n: int, k_max: float, seed: int) -> np.ndarray:
-    """Fault vectors of all sizes alike: within 0…κ, κ log-uniform from k_max/25 to k_max, shape (n, 6)."""
+    """Fault vectors of all sizes alike: within 0…κ, κ log-uniform from k_max/25 to k_max, every other with few faults.
+
+    Shape (n, 6).
+    """
     u = qmc.LatinHypercube(N_FAULTS + 1, rng=np.random.default_rng(seed)).random(n)
-    return np.asarray(u[:, :N_FAULTS] * k_max * 25.0 ** (u[:, N_FAULTS:] - 1.0))
+    k = u[:, :N_FAULTS] * k_max * 25.0 ** (u[:, N_FAULTS:] - 1.0)
+    k[::2] = few(k[::2], seed)
+    return np.minimum(k, 1.0)
 
 
 def heldout_faults(n: int, k_max: float, seed: int) -> np.ndarray:
-    """Fault vectors to measure model errors on, shape (n, 6): half with all faults, half with one to three alone.
+    """Fault vectors to measure model errors on, shape (n, 6): the first half with all faults, the second with few.
 
-    A fault mostly grows alone, and a model errs most along the axes: from dense vectors only, its error would be
-    underestimated there. The few are scaled to the size ‖k‖ of the many.
+    All have one size, ‖k‖ = √2 k_max, the root mean square of vectors drawn from 0…k_max.
     """
     k = latin_hypercube(n, k_max, seed)
+    k[n // 2 :] = few(k[n // 2 :], seed)
+    return np.minimum(np.sqrt(2.0) * k_max * k / np.linalg.norm(k, axis=1, keepdims=True), 1.0)
+
+
+def few(k: np.ndarray, seed: int) -> np.ndarray:
+    """Of each fault vector of `k` (n, 6) one to three faults alone, scaled to the mean size ‖k‖ of six.
+
+    A fault mostly grows alone, and models err differently there: what is known from vectors with all faults only is
+    wrong for such.
+    """
     rng = np.random.default_rng(seed)
-    for row in k[n // 2 :]:
-        alone = rng.choice(N_FAULTS, rng.integers(1, 4), replace=False)
-        rest = np.setdiff1d(np.arange(N_FAULTS), alone)
-        row[alone] *= np.sqrt(N_FAULTS / len(alone))
-        row[rest] = 0.0
-    return np.minimum(k, 1.0)
+    kept = np.zeros_like(k)
+    for row, full in zip(kept, k, strict=True):
+        alone = rng.choice(len(row), rng.integers(1, 4), replace=False)
+        row[alone] = full[alone] * np.sqrt(len(row) / len(alone))
+    return kept
 
 
 def random_starts(plant: Actuator, k: np.ndarray, seed: int) -> np.ndarray:

@@ -1,16 +1,18 @@
 """How much a measured envelope may differ from a model's: by switching, by the model's own error, by the start state.
 
-    Σ(k, start) = Σ_switch + M(‖k‖) + d² Σ_start
+    Σ(k, start) = Σ_switch + M(k) + d² Σ_start
 
-Σ_switch: two runs of the same actuator differ by what decides its comparators. M: covariance of the model's error for
-faults of a size, measured by the builder on held-out faults at some sizes (it follows no simple power) and interpolated
-in ‖k‖². Σ_start: what is left of the start state's influence when its linear part is taken off; it grows
-with the distance d of the start from the middle of the gap at zero.
+Σ_switch: two runs of the same actuator differ by what decides its comparators. M: covariance of the model's error,
+measured by the builder on held-out faults of some sizes ‖k‖, apart for faults that grow alone or in twos and threes and
+for all at once, since models err differently there. Between sizes its trace follows a power of ‖k‖. Σ_start: what is
+left of the start state's influence when its linear part is taken off; it grows with the distance d of the start from
+the middle of the gap at zero.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,9 +29,11 @@ class NoiseModel:
     switching : array, shape (n_omega, n_omega)
         Covariance of one run of an actuator. [A²]
     sizes : array, shape (m,)
-        Sizes ‖k‖ at which the model's error was measured, ascending from 0. [1]
-    model_error : array, shape (m, n_omega, n_omega)
-        Covariance of the model's error at these sizes. [A²]
+        Sizes ‖k‖ at which the model's error was measured, ascending. [1]
+    spreads : array, shape (2,)
+        Mean `spread` of the few and of the many faults with which it was measured. [1]
+    model_error : array, shape (2, m, n_omega, n_omega)
+        Covariance of the model's error for few and for many faults at these sizes. [A²]
     start : array, shape (n_omega, n_omega)
         Covariance for a start at d = 1. [A²]
     B : array, shape (n_omega, 2)
@@ -40,6 +44,7 @@ class NoiseModel:
 
     switching: np.ndarray
     sizes: np.ndarray
+    spreads: np.ndarray
     model_error: np.ndarray
     start: np.ndarray
     B: np.ndarray
@@ -52,16 +57,42 @@ class NoiseModel:
     def covariance(self, start: np.ndarray | None, k: np.ndarray) -> np.ndarray:
         """Σ for a cycle that began at `start` with faults near `k`."""
         d2 = D2_UNKNOWN if start is None else min(float(np.sum((start / self.start_scale) ** 2)), D2_MAX)
-        return self.switching + self._at_size(k) + d2 * self.start
+        return self.switching + self.of_model(k) + d2 * self.start
 
-    def _at_size(self, k: np.ndarray) -> np.ndarray:
-        s2, q = self.sizes**2, float(k @ k)
-        if q >= s2[-1]:
-            return self.model_error[-1] * (q / s2[-1] if s2[-1] > 0 else 1.0)
-        upper = int(np.searchsorted(s2, q, side="right"))
-        share = (q - s2[upper - 1]) / (s2[upper] - s2[upper - 1])
-        return (1.0 - share) * self.model_error[upper - 1] + share * self.model_error[upper]
+    def of_model(self, k: np.ndarray) -> np.ndarray:
+        """M(k), shape (n_omega, n_omega); beyond the sizes measured as between the last two. [A²]"""
+        size = float(np.sqrt(k @ k))
+        if size == 0.0:
+            return np.zeros_like(self.switching)
+        few, many = self.spreads
+        share = min(max((spread(k) - few) / (many - few), 0.0), 1.0)
+        log_size, log_trace, shape = self._levels
+        place = float(np.interp(np.log(size), log_size[1:-1], np.arange(len(self.sizes))))
+        lower = min(int(place), len(self.sizes) - 2)
+        M = np.zeros_like(self.switching)
+        for part, half in ((1.0 - share, 0), (share, 1)):
+            trace = part * np.exp(np.interp(np.log(size), log_size, log_trace[half]))
+            M += trace * (1.0 + lower - place) * shape[half, lower] + trace * (place - lower) * shape[half, lower + 1]
+        return M
+
+    @cached_property
+    def _levels(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Logarithms of size (m + 2,) and of M's trace (2, m + 2), both continued to either side; M of trace one."""
+        trace = np.maximum(np.trace(self.model_error, axis1=-2, axis2=-1), 1e-9 * np.trace(self.switching))
+        log_size, log_trace, far = np.log(self.sizes), np.log(trace), 20.0
+        power = np.diff(log_trace[:, -2:])[:, 0] / np.diff(log_size[-2:])
+        continued = np.column_stack([log_trace[:, 0] - 2.0 * far, log_trace, log_trace[:, -1] + power * far])
+        sizes = np.array([log_size[0] - far, *log_size, log_size[-1] + far])
+        return sizes, continued, self.model_error / trace[..., None, None]
 
     def beyond(self, k: np.ndarray) -> bool:
         """Whether the faults are clearly larger than any the model was measured for."""
         return bool(np.sqrt(k @ k) > 1.25 * self.sizes[-1])
+
+
+def spread(k: np.ndarray) -> np.ndarray:
+    """How evenly the size of fault vectors `k` (..., d) is spread over their elements, 1/d (one alone) … 1.
+
+    (Σ |k_j|)² / (d Σ k_j²)
+    """
+    return np.asarray(np.sum(np.abs(k), axis=-1) ** 2 / (k.shape[-1] * np.sum(k**2, axis=-1)))

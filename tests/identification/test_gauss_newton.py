@@ -16,7 +16,8 @@ N = 30
 RNG = np.random.default_rng(5)
 A = RNG.standard_normal((N, 6))
 S = 1e-4 * np.eye(N)
-NOISE = NoiseModel(S, np.array([0.0, 1.0]), np.zeros((2, N, N)), np.zeros((N, N)), np.zeros((N, 2)), np.ones(2))
+LEVELS = np.array([0.1, 1.0]), np.array([0.3, 0.7]), np.zeros((2, 2, N, N))
+NOISE = NoiseModel(S, *LEVELS, np.zeros((N, N)), np.zeros((N, 2)), np.ones(2))
 START = np.zeros(2)
 
 

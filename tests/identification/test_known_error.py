@@ -5,24 +5,37 @@ import numpy as np
 from ema.identification.known_error import N_TERMS, KnownError, monomials
 
 
-def test_monomials_are_all_of_degree_one_to_three():
+def test_monomials_are_all_of_degree_one_to_four():
     k = np.random.default_rng(1).random((5, 6))
     m = monomials(k)
-    assert m.shape == (5, N_TERMS) == (5, 83)
+    assert m.shape == (5, N_TERMS) == (5, 209)
     assert np.allclose(m[:, :6], k)
     assert np.allclose(m.sum(axis=1) + 1.0, [_complete(x) for x in k])
 
 
 def _complete(x: np.ndarray) -> float:
-    """Complete homogeneous polynomials up to degree three, by Newton's identities."""
-    p1, p2, p3 = x.sum(), (x**2).sum(), (x**3).sum()
-    return 1 + p1 + (p1**2 + p2) / 2 + (p1**3 + 3 * p1 * p2 + 2 * p3) / 6
+    """Complete homogeneous polynomials up to degree four, by Newton's identities."""
+    h = [1.0]
+    for degree in range(1, 5):
+        h.append(sum(np.sum(x**j) * h[degree - j] for j in range(1, degree + 1)) / degree)
+    return sum(h)
 
 
-def test_a_cubic_error_is_learned():
+def quartic(n: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    k = rng.random((n, 6)) * 0.3
+    return k, monomials(k) @ np.random.default_rng(7).standard_normal((N_TERMS, 4))
+
+
+def test_a_quartic_error_is_learned():
     rng = np.random.default_rng(2)
-    k, c = rng.random((400, 6)) * 0.3, rng.standard_normal((N_TERMS, 4))
-    fitted = KnownError.fitted(k, monomials(k) @ c, knee=0.15)
-    new = rng.random((50, 6)) * 0.3
-    truth = monomials(new) @ c
-    assert np.abs(fitted(new) - truth).max() < 1e-3 * np.abs(truth).max()
+    fitted = KnownError.fitted(*quartic(600, rng), knee=0.15)
+    k, truth = quartic(50, rng)
+    assert np.abs(fitted(k) - truth).max() < 1e-3 * np.abs(truth).max()
+
+
+def test_from_few_noisy_runs_nothing_is_made_up():
+    """As many runs as monomials and only noise: what is learned is less than the noise."""
+    rng = np.random.default_rng(3)
+    k = rng.random((N_TERMS, 6)) * 0.3
+    fitted = KnownError.fitted(k, rng.standard_normal((len(k), 4)), knee=0.15)
+    assert np.sqrt(np.mean(fitted(rng.random((200, 6)) * 0.3) ** 2)) < 0.5

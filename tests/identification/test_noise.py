@@ -1,0 +1,36 @@
+"""The model's error between the sizes and kinds of faults at which it was measured."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema.identification.noise import NoiseModel, spread
+
+SIZES = np.array([0.1, 0.2, 0.4])
+FEW, MANY = np.diag([1.0, 0.0]), np.diag([0.0, 1.0])
+MODEL_ERROR = np.array([[size**4 * shape for size in SIZES] for shape in (FEW, MANY)])
+NOISE = NoiseModel(
+    1e-9 * np.eye(2), SIZES, np.array([1 / 6, 1.0]), MODEL_ERROR, np.zeros((2, 2)), np.zeros((2, 2)), np.ones(2)
+)
+
+
+def test_spread_of_one_and_of_all():
+    assert spread(np.array([[0, 0, 0.3, 0, 0, 0], [0.2] * 6])) == pytest.approx([1 / 6, 1.0])
+
+
+@pytest.mark.parametrize("size", [0.1, 0.15, 0.2, 0.3, 0.4, 0.6])
+def test_a_power_of_the_size_is_followed(size):
+    alone, together = np.eye(6)[3] * size, np.ones(6) * size / 6**0.5
+    assert NOISE.of_model(alone) == pytest.approx(size**4 * FEW, rel=1e-6, abs=1e-12)
+    assert NOISE.of_model(together) == pytest.approx(size**4 * MANY, rel=1e-6, abs=1e-12)
+
+
+def test_without_faults_a_model_does_not_err():
+    assert not NOISE.of_model(np.zeros(6)).any()
+    assert np.trace(NOISE.of_model(np.full(6, 1e-3))) < 1e-3 * np.trace(MODEL_ERROR[1, 0])
+
+
+def test_an_error_never_seen_stays_none():
+    none = NoiseModel(np.eye(2), SIZES, np.array([0.2, 0.8]), 0.0 * MODEL_ERROR, *np.zeros((2, 2, 2)), np.ones(2))
+    assert np.allclose(none.covariance(np.zeros(2), np.full(6, 0.3)), np.eye(2))
