@@ -40,6 +40,17 @@ class Soak:
         n, rss = np.array([n for n, _ in half]), np.array([f.rss for _, f in half])
         return float(np.polyfit(n, rss, 1)[0] * (n[-1] - n[0]))
 
+    def slope(self) -> float:
+        """Memory's growth per 1 000 cycles, over the second half. [B]"""
+        half = self.samples[len(self.samples) // 2 :]
+        return self.growth() / (half[-1][0] - half[0][0]) * 1000
+
+    def cost(self, begin: float, end: float) -> float:
+        """The daemon's processor time for a cycle, within these shares of the run. [s]"""
+        part = self.samples[int(begin * len(self.samples)) : max(2, round(end * len(self.samples)))]
+        (n_first, first), (n_last, last) = part[0], part[-1]
+        return (last.cpu - first.cpu) / (n_last - n_first)
+
     def faults(self) -> list[str]:
         """What is not as it should be."""
         first, last = self.samples[len(self.samples) // 2][1], self.samples[-1][1]
@@ -96,10 +107,13 @@ def main() -> int:
         n_segments = len(list(rig.log.glob("*.mcap")))
     tenth = max(1, len(seen.latency) // 10)
     before, after = (1e3 * float(np.median(part)) for part in (seen.latency[:tenth], seen.latency[-tenth:]))
+    cost = [1e3 * seen.cost(*share) for share in ((0.0, 0.5), (0.5, 1.0))]
     faults = seen.faults() + ([f"the daemon ended with {status}"] if status else [])
     print(
         f"{len(seen.latency)} of {seen.n_sent} cycles estimated; memory's growth over the second half "
-        f"{seen.growth() / 1e6:+.2f} MB; latency {before:.1f} ms in the first tenth, {after:.1f} ms in the last; "
+        f"{seen.growth() / 1e6:+.2f} MB ({seen.slope() / 1e3:+.2f} kB per 1000 cycles); processor time for a cycle "
+        f"{cost[0]:.2f} ms in the first half, {cost[1]:.2f} ms in the second; "
+        f"latency {before:.1f} ms in the first tenth, {after:.1f} ms in the last; "
         f"{n_segments} segments kept; {'; '.join(faults) or 'all constant'}"
     )
     return int(bool(faults))

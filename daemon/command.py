@@ -31,7 +31,7 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(message)s")
     settings = load(config_path)
     if bus is not None:
-        settings = settings.model_copy(update={"bus": interface.parse(bus)})
+        settings = settings.model_copy(update={"bus": interface.elsewhere(settings.bus, bus)})
     if log_path is not None:
         log = settings.log.model_copy(update={"directory": str(Path(log_path).resolve())})
         settings = settings.model_copy(update={"log": log})

@@ -17,6 +17,7 @@ _TROUBLE = {
     "n_wrong_length": "of wrong length",
     "n_repeated": "repeated",
     "n_reordered": "late",
+    "n_refused": "refused, not authentic",
     "kernel_drops": "dropped by the kernel (receive buffer full)",
 }
 _HARMLESS = {"n_repeated", "n_reordered"}  # noted, but no data are missing
@@ -85,7 +86,6 @@ class Health:
             "n_cycles": self.monitor.n_cycles,
             "n_estimates": self.monitor.n_estimates,
             **asdict(self.monitor.counts),
-            "n_refused": port.n_refused,
             "kernel_drops": port.kernel_drops,
             "n_received": port.n_received,
             "n_sent": port.n_sent,

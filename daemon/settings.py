@@ -69,7 +69,8 @@ def load(path: Path) -> DaemonSettings:
     }
     log = settings.log.model_copy(update={"directory": str(folder / settings.log.directory)})
     remote = {method: str(folder / socket) for method, socket in settings.remote.items()}
-    return settings.model_copy(update={"actuators": actuators, "log": log, "remote": remote})
+    bus = settings.bus.model_copy(update={"key_file": settings.bus.key_file and folder / settings.bus.key_file})
+    return settings.model_copy(update={"bus": bus, "actuators": actuators, "log": log, "remote": remote})
 
 
 def load_bundles(settings: DaemonSettings) -> dict[int, Bundle]:

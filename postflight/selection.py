@@ -13,7 +13,7 @@ from ema.core.frames import FrameFlag
 from ema.log.reader import FrameBatch
 
 _FILTER = re.compile(r"(~?)([0-9A-Fa-f]{1,8})(?::([0-9A-Fa-f]{1,8})|-([0-9A-Fa-f]{1,8}))?")
-_NOT_TRAFFIC = int(FrameFlag.ERROR)
+_NOT_TRAFFIC = int(FrameFlag.ERROR | FrameFlag.REFUSED)
 
 
 class IdFilter(NamedTuple):
@@ -60,7 +60,7 @@ class Selection(NamedTuple):
     renamed: dict[int, int] = {}  # noqa: RUF012
 
     def apply(self, batches: Iterable[FrameBatch]) -> Iterator[FrameBatch]:
-        """The chosen frames, without error frames."""
+        """The chosen frames, without error frames and those that message authentication has refused."""
         for bus, frames in batches:
             if self.buses and bus not in self.buses:
                 continue

@@ -91,5 +91,6 @@ def _to_bus(scenario: Any, plant: Any, on_cycle: Any) -> None:
         done = run(scenario, plant, port, codec.default(), stop, on_cycle=on_cycle, say=say)
     say(
         f"{done.n_cycles} cycles, {done.n_frames} frames sent, {done.n_refused} refused by the bus, "
-        f"{done.n_injections} fault injections, schedule moved {done.n_delays} times"
+        f"{done.n_injections} fault injections ({done.n_not_authentic} not authentic), "
+        f"schedule moved {done.n_delays} times"
     )

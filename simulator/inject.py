@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 
@@ -10,10 +12,12 @@ import click
 @click.option("--bus", default="auto", show_default=True, metavar="BUS", help="auto, vcan0, udp_multicast …")
 @click.option("--actuator", type=click.IntRange(0, 63), default=0, show_default=True)
 @click.option("--ramp", type=click.FloatRange(0, 655), default=0.0, show_default=True, help="Time to get there [s].")
-def inject(faults: tuple[str, ...], bus: str, actuator: int, ramp: float) -> None:
+@click.option("--key-file", type=click.Path(path_type=Path), help="Of a bus whose frames are authenticated.")
+def inject(faults: tuple[str, ...], bus: str, actuator: int, ramp: float, key_file: Path | None) -> None:
     """Send the faults a simulated actuator shall go to, each 0…1; those not named go to 0.
 
-    Heard only by a simulator whose scenario says `allow_injection: true`. Real actuators have no such thing.
+    Heard only by a simulator whose scenario says `allow_injection: true`; where its bus has a key file, only with the
+    same key. Real actuators have no such thing.
 
     \b
     Example:
@@ -42,7 +46,7 @@ def inject(faults: tuple[str, ...], bus: str, actuator: int, ramp: float) -> Non
     frames = codec.default().encode(MESSAGE, actuator, values)
     sender = Sender()
     sender.skip(identifiers.with_actuator(int(frames["id"][0]), actuator), time.time_ns() // 10**6 % N_SEQUENCES)
-    with open_bus(parse(bus)) as port:
+    with open_bus(parse(bus).model_copy(update={"key_file": key_file})) as port:
         if port.write(sender.protect(frames)) < frames.size:
             raise BusError("; ".join(port.take_events()) or f"bus {port.name} does not take frames")
         click.echo(f"{port.choice}; sent to actuator {actuator}: {' '.join(faults) or 'no faults'}", err=True)

@@ -25,6 +25,11 @@ class FaultSource:
         self._ramps: dict[int, tuple[float, float, np.ndarray, np.ndarray]] = {}  # by lane: start, end, from, to
         self.n_injections = 0
 
+    @property
+    def n_refused(self) -> int:
+        """Fault-injection frames that were not authentic."""
+        return self._receiver.counts.n_refused
+
     def at(self, t: float) -> np.ndarray:
         """Fault vectors of all actuators at the time `t` [s], shape (n_actuators, 6)."""
         return np.array([self._of_lane(lane, t) for lane in range(len(self._scenario.actuators))])

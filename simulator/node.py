@@ -34,6 +34,7 @@ class Summary:
     n_refused: int = 0  # frames the bus did not take
     n_delays: int = 0  # times the schedule had to be moved because this machine is too slow
     n_injections: int = 0
+    n_not_authentic: int = 0  # fault injections that were refused
 
 
 def cycles(scenario: Scenario, plant: Actuator, faults: FaultSource) -> Iterator[CycleData]:
@@ -103,5 +104,5 @@ def run(
                 stop.wait(min(_MAX_WAIT, deadlines[sent] - now))
         if stop.is_set():
             break
-    summary.n_injections = faults.n_injections
+    summary.n_injections, summary.n_not_authentic = faults.n_injections, faults.n_refused
     return summary

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from ema.bus.identifiers import N_ACTUATORS
-from ema.bus.interface import BusSettings, parse
+from ema.bus.interface import BusSettings, elsewhere
 from ema.core import config, resources
 from ema.core.config import Settings
 from ema.core.errors import ConfigError
@@ -108,7 +108,7 @@ def load(path: str | Path) -> tuple[Scenario, Actuator]:
 
 def override(scenario: Scenario, bus: str | None, rate: float | None, n_cycles: int | None) -> Scenario:
     """The scenario with what the command line says otherwise."""
-    place = bus and scenario.bus.model_copy(update=parse(bus).model_dump(exclude={"key_file"}))
+    place = bus and elsewhere(scenario.bus, bus)
     said = {"bus": place, "rate": rate, "n_cycles": n_cycles}
     return scenario.model_copy(update={key: value for key, value in said.items() if value})
 

@@ -9,9 +9,6 @@ earlier is refused, also after either side was restarted.
 from __future__ import annotations
 
 import string
-from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -117,77 +114,90 @@ class Sealer(_Authenticator):
         return self._codec.encode(seal.name, identifiers.actuator(frame_id), values)
 
 
-@dataclass(slots=True)
-class _Waiting:
-    frame: np.ndarray  # shape (1,)
-    genuine: bool
-
-
 class Verifier(_Authenticator):
-    """Holds frames back until their seal is there; what is not sealed in time, or wrongly, is refused.
+    """Lets frames through when their seal is there; what is not sealed in time, or wrongly, is marked as refused.
 
-    Attributes
-    ----------
-    n_refused : int
-        Frames refused so far.
+    No frame waits for another one's seal, so that forged ones delay nothing. Time is that of the received frames: a
+    reader that is late refuses no more than one that is not.
     """
 
     def __init__(self, codec: Codec, key: bytes):
         super().__init__(codec, key)
-        self.n_refused = 0
-        self._queue: deque[_Waiting] = deque()
-        self._by_number: dict[tuple[int, int], list[_Waiting]] = {}  # Data ID and sequence number
+        self._n_arrived = 0
+        self._waiting: dict[int, np.ndarray] = {}  # frames, shape (1,), by order of arrival
+        self._by_number: dict[tuple[int, int], list[int]] = {}  # of those, by Data ID and sequence number
         self._freshness: dict[int, int] = {}  # last one by Data ID
 
     def feed(self, frames: np.ndarray, now_ns: int) -> np.ndarray:
-        """Take received frames; those that are genuine or need no seal, in the order received."""
-        numbers = sequence(frames).tolist()
-        for n, frame_id in enumerate(frames["id"].tolist()):
+        """Take received frames; those decided upon, in the order received, with FrameFlag.REFUSED where not genuine.
+
+        Parameters
+        ----------
+        frames : array, shape (n,), FRAME_DTYPE
+        now_ns : int
+            Used while no frames come. [ns]
+
+        Returns
+        -------
+        decided : array, shape (m,), FRAME_DTYPE
+            Frames of no message that is sealed are among them; seals are not.
+        """
+        decided: dict[int, np.ndarray] = {}
+        for n, (frame_id, number) in enumerate(zip(frames["id"].tolist(), sequence(frames).tolist(), strict=True)):
+            frame = frames[n : n + 1]
             message = self._codec.find(frame_id)
             if message is not None and message.name.endswith("Seal"):
-                self._unseal(message, frames[n : n + 1])
+                decided |= self._unseal(message, frame)
                 continue
-            waiting = _Waiting(frames[n : n + 1].copy(), self.seal_of(frame_id) is None)
-            self._queue.append(waiting)
-            if not waiting.genuine:
-                self._by_number.setdefault((identifiers.data_id(frame_id), numbers[n]), []).append(waiting)
-        released = list(self._released(now_ns))
-        return np.concatenate(released) if released else fr.empty(0)
+            self._n_arrived += 1
+            if self.seal_of(frame_id) is None:
+                decided[self._n_arrived] = frame
+            else:
+                self._waiting[self._n_arrived] = frame.copy()
+                self._by_number.setdefault((identifiers.data_id(frame_id), number), []).append(self._n_arrived)
+        decided |= self._given_up(int(frames["t_ns"][-1]) if frames.size else now_ns)
+        return np.concatenate([decided[n] for n in sorted(decided)]) if decided else fr.empty(0)
 
-    def _unseal(self, message: Message, frame: np.ndarray) -> None:
+    def _unseal(self, message: Message, frame: np.ndarray) -> dict[int, np.ndarray]:
+        """What a seal decides: once one frame shows that it is genuine, all the others with its numbers as well."""
         if frame["length"][0] != message.length:
-            return
+            return {}
         said = {name: value[0] for name, value in message.decode(frame).items()}
         data_id, freshness = int(said["data_id"]), int(said["freshness"])
         is_late = freshness <= self._freshness.get(data_id, 0)
         if is_late or abs(freshness * 1000 - int(frame["t_ns"][0])) > _WINDOW_NS:
-            return
+            return {}
+        genuine: dict[int, bool] = {}
         for n in range(min(int(said["n_sealed"]), PER_SEAL)):
-            for waiting in self._by_number.get((data_id, (int(said["first_sequence"]) + n) % N_SEQUENCES), ()):
-                if self.mac(data_id, freshness, _payload(waiting.frame[0])) == int(said["mac"][n]):
-                    waiting.genuine = True
-                    self._freshness[data_id] = freshness  # a forged seal cannot advance it
+            for arrival in self._by_number.get((data_id, (int(said["first_sequence"]) + n) % N_SEQUENCES), ()):
+                mac = self.mac(data_id, freshness, _payload(self._waiting[arrival][0]))
+                genuine[arrival] = mac == int(said["mac"][n])
+        if not any(genuine.values()):
+            return {}
+        self._freshness[data_id] = freshness  # a forged seal cannot advance it
+        return {arrival: self._taken(arrival, fits) for arrival, fits in genuine.items()}
 
-    def _released(self, now_ns: int) -> Iterator[np.ndarray]:
-        while self._queue:
-            first = self._queue[0]
-            age = abs(now_ns - int(first.frame["t_ns"][0]))  # either way: the clock may be set back
-            if not (first.genuine or age > _PATIENCE_NS or len(self._queue) > _MAX_WAITING):
-                return
-            self._queue.popleft()
-            self._forget(first)
-            if first.genuine:
-                yield first.frame
-            else:
-                self.n_refused += 1
+    def _given_up(self, now_ns: int) -> dict[int, np.ndarray]:
+        """What has waited too long."""
+        late: list[int] = []
+        for arrival, frame in self._waiting.items():
+            age = abs(now_ns - int(frame["t_ns"][0]))  # either way: the clock may be set back
+            if age <= _PATIENCE_NS and len(self._waiting) - len(late) <= _MAX_WAITING:
+                break
+            late.append(arrival)
+        return {arrival: self._taken(arrival, False) for arrival in late}
 
-    def _forget(self, waiting: _Waiting) -> None:
-        key = identifiers.data_id(int(waiting.frame["id"][0])), int(sequence(waiting.frame)[0])
-        same = self._by_number.get(key)
-        if same is not None:
-            same[:] = [other for other in same if other is not waiting]
-            if not same:
-                del self._by_number[key]
+    def _taken(self, arrival: int, genuine: bool) -> np.ndarray:
+        """A frame that need not wait any more."""
+        frame = self._waiting.pop(arrival)
+        key = identifiers.data_id(int(frame["id"][0])), int(sequence(frame)[0])
+        same = self._by_number[key]
+        same.remove(arrival)
+        if not same:
+            del self._by_number[key]
+        if not genuine:
+            frame["flags"] |= int(fr.FrameFlag.REFUSED)
+        return frame
 
 
 def _payload(frame: np.ndarray) -> bytes:

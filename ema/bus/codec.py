@@ -22,6 +22,7 @@ from . import identifiers
 from .header import HEADER_SIGNALS
 
 _FLAGS = int(fr.FrameFlag.EXTENDED | fr.FrameFlag.FD)
+_REFUSED = int(fr.FrameFlag.REFUSED)
 _DATA_OFFSET = fr.FRAME_DTYPE.fields["data"][1]  # type: ignore[index]
 
 
@@ -112,11 +113,12 @@ class Codec:
         return [(m.frame_id, identifiers.MESSAGE_MASK) for m in self.messages.values() if m.sender == sender]
 
     def split(self, frames: np.ndarray) -> Iterator[tuple[Message, np.ndarray]]:
-        """The messages in a batch, each with its frames in order; foreign frames are left out."""
+        """The messages in a batch, each with its frames in order; foreign and refused frames are left out."""
         ids = identifiers.message_id(frames["id"])
-        for frame_id in sorted(set(ids.tolist())):
+        accepted = (frames["flags"] & _REFUSED) == 0
+        for frame_id in sorted(set(ids[accepted].tolist())):
             if frame_id in self._by_id:
-                yield self._by_id[frame_id], frames[ids == frame_id]
+                yield self._by_id[frame_id], frames[(ids == frame_id) & accepted]
 
     def encode(self, name: str, actuator: int, values: Mapping[str, Any], t_ns: Any = 0) -> np.ndarray:
         """Frames of one message; the header stays zero until `protection.Sender` fills it.

@@ -50,6 +50,13 @@ def parse(text: str) -> BusSettings:
     return BusSettings(interface="socketcan", channel=text)
 
 
+def elsewhere(settings: BusSettings, text: str) -> BusSettings:
+    """The same bus at another place (see `parse`): with its key, and its options where they fit."""
+    place = parse(text)
+    options = settings.options if place.interface == settings.interface else {}
+    return place.model_copy(update={"key_file": settings.key_file, "options": options})
+
+
 def open_bus(settings: BusSettings, filters: Filters | None = None) -> Port:
     """Open the bus; its `choice` says what was taken and why. BusError when it cannot be opened.
 

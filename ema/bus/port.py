@@ -31,7 +31,6 @@ class PortCounters:
     n_error_frames: int = 0  # from the CAN controller
     n_unreadable: int = 0  # not a CAN frame at all
     n_link_down: int = 0
-    n_refused: int = 0  # by message authentication
     kernel_drops: int = 0  # the kernel's receive buffer was full
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 import numpy as np
 from e2e.p05 import e2e_p05_check, e2e_p05_protect
@@ -20,7 +20,8 @@ __all__ = ["GOOD", "Check", "Counts", "Receiver", "Sender", "Stream", "StreamSta
 _ROW = FRAME_DTYPE.itemsize
 _DATA = FRAME_DTYPE.fields["data"][1]  # type: ignore[index]
 _FORMAT = int(FrameFlag.EXTENDED | FrameFlag.FD)
-_FORMAT_MASK = _FORMAT | int(FrameFlag.REMOTE | FrameFlag.ERROR)
+_REFUSED = int(FrameFlag.REFUSED)
+_FORMAT_MASK = _FORMAT | _REFUSED | int(FrameFlag.REMOTE | FrameFlag.ERROR)
 RESTART_NS = 500_000_000  # an actuator that is on is heard ten times a second
 
 
@@ -98,18 +99,23 @@ class Receiver:
             if stream is None:
                 self._n_foreign += 1
                 checks[n] = Check.FOREIGN
-            elif length != stream.length or form != _FORMAT:
+            elif length != stream.length or form & ~_REFUSED != _FORMAT:
                 checks[n] = stream.refuse(Check.WRONG_LENGTH)
             elif not e2e_p05_check(raw[begin : begin + length], stream.data_id):
                 checks[n] = stream.refuse(Check.CRC_ERROR)
+            elif form != _FORMAT:
+                checks[n] = stream.refuse(Check.REFUSED)
             elif number == stream.expected and stream.steady:  # the usual case: nothing but the next frame
                 stream.expected = (number + 1) % N_SEQUENCES
                 stream.counts.n_good += 1
                 stream.last_ns = t_ns
             else:
                 if t_ns - self._last_heard(frame_id) > RESTART_NS:
-                    self._begin_anew(frame_id)
+                    self._begin_anew(self._siblings(frame_id))
+                n_restarts = stream.n_restarts
                 check = checks[n] = stream.place(number, t_ns)
+                if stream.n_restarts > n_restarts:
+                    self._begin_anew(other for other in self._siblings(frame_id) if other is not stream)
                 if check <= GOOD:
                     stream.last_ns = t_ns
         return np.frombuffer(checks, np.uint8)
@@ -131,12 +137,15 @@ class Receiver:
         """When the last good frame of the same actuator came. [ns]"""
         return max((stream.last_ns for stream in self._siblings(frame_id)), default=0)
 
-    def _begin_anew(self, frame_id: int) -> None:
-        """After a long silence an actuator may have been restarted, and then counts from its beginning.
+    @staticmethod
+    def _begin_anew(streams: Iterable[Stream]) -> None:
+        """Take the next frame of each as it comes: its actuator has been restarted, or may have been.
 
-        Its rare frames need this: CycleStart a few cycles after a restart looks like an old one sent again.
+        It may have been after a long silence, and it has been when one of its streams shows it: then all of them
+        count from their beginning. The rare ones need to be told: CycleStart a few cycles after a restart looks like an
+        old one sent again.
         """
-        for stream in self._siblings(frame_id):
+        for stream in streams:
             stream.expected = -1
 
     def _open(self, frame_id: int) -> Stream | None:

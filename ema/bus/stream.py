@@ -24,6 +24,7 @@ class Check(IntEnum):
     CRC_ERROR = 5
     WRONG_LENGTH = 6  # length or format is not that of the DBC
     FOREIGN = 7  # no message of this receiver
+    REFUSED = 8  # whole, but message authentication says it is forged, replayed or without its seal
 
 
 GOOD = Check.REORDERED  # checks up to this one carry data
@@ -42,6 +43,7 @@ class Counts:
     n_wrong_length: int = 0
     n_timeout: int = 0
     n_foreign: int = 0
+    n_refused: int = 0
 
     def __add__(self, other: Counts) -> Counts:
         return Counts(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
@@ -66,6 +68,7 @@ class Stream:
     expected: int = -1  # next sequence number; -1 before the first frame
     steady: bool = False
     last_ns: int = 0
+    n_restarts: int = 0  # of the sender, as far as this stream shows them
     _stray: int = -1  # sequence number of the last frame far off, -1: none since the last good one
     _n_strays: int = 0  # in sequence
     _left: int = -1  # what was expected before the stream followed another sequence, -1: it has not
@@ -73,7 +76,10 @@ class Stream:
     _missing: dict[int, None] = field(default_factory=dict)  # lost sequence numbers, oldest first
 
     def refuse(self, check: Check) -> Check:
-        """Count a frame whose length or CRC is wrong."""
+        """Count a frame whose length or CRC is wrong, or that is not authentic: the last says nothing of the stream."""
+        if check is Check.REFUSED:
+            self.counts.n_refused += 1
+            return check
         if check is Check.CRC_ERROR:
             self.counts.n_crc_error += 1
         else:
@@ -119,6 +125,7 @@ class Stream:
                 self._left = -1
             elif self._has_restarted(sequence, t_ns):
                 self._left, self._followed = self.expected, sequence
+                self.n_restarts += 1
                 distance = 0
             else:
                 self._stray = sequence

@@ -1,4 +1,4 @@
-"""python-can messages to and from frames."""
+"""python-can messages to and from frames; a refused frame is an error frame there, so that nobody takes its data."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def message(frame: Any, channel: Any = None) -> can.Message:
         arbitration_id=int(frame["id"]),
         is_extended_id=bool(flags & FrameFlag.EXTENDED),
         is_remote_frame=bool(flags & FrameFlag.REMOTE),
-        is_error_frame=bool(flags & FrameFlag.ERROR),
+        is_error_frame=bool(flags & (FrameFlag.ERROR | FrameFlag.REFUSED)),
         is_fd=bool(flags & FrameFlag.FD),
         bitrate_switch=bool(flags & FrameFlag.BRS),
         error_state_indicator=bool(flags & FrameFlag.ESI),

@@ -28,6 +28,7 @@ class FrameFlag(IntFlag):
     BRS = 16  # bit-rate switch
     ESI = 32  # error state indicator
     TX = 64  # sent by this process, not received
+    REFUSED = 128  # by message authentication: kept as evidence, its data are nobody's
 
 
 def empty(count: int) -> np.ndarray:

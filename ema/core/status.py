@@ -30,7 +30,7 @@ class Reason(IntFlag):
     AT_BOUND = 1 << 10  # some k at 0 or 1
     UNSEPARABLE = 1 << 11  # the data cannot tell some k apart
     TIMEOUT = 1 << 12
-    AUTHENTICATION = 1 << 13
+    AUTHENTICATION = 1 << 13  # frames in this actuator's name were refused as not authentic
     KERNEL_DROPS = 1 << 14
     OUT_OF_RANGE = 1 << 15  # outside the range the model was built for
 

@@ -157,11 +157,13 @@ class Assembler:
             return
         currents = batch.message == self._currents
         motions = (batch.message == self._motion) & (batch.checks <= GOOD)
+        refused = batch.checks == Check.REFUSED
         for number, assembly in self._assemblies.items():
             own = batch.actuator == number
             if own.any():
                 mine = own & currents
                 assembly.place(batch.frames[mine], batch.checks[mine], batch.frames[own & motions])
+                assembly.note_refused(int(np.count_nonzero(own & refused)))
 
     def _mark(self, mark: _Batch) -> Iterator[AssembledCycle | Event]:
         """A good CycleStart or CycleEnd, or the notice that frames were dropped."""

@@ -20,6 +20,9 @@ from .track import Track
 
 NEVER = np.iinfo(np.int64).max
 _NOTHING = Reason(0)
+_OF_TALLY = (
+    Reason.LOST_FRAMES, Reason.REORDERED_FRAMES, Reason.REPEATED_FRAMES, Reason.CORRUPT_FRAMES, Reason.AUTHENTICATION,
+)  # fmt: skip
 
 
 class Due(NamedTuple):
@@ -51,6 +54,7 @@ class Assembly:
         plan = Span(0, 0, 0, n_samples, 0.0, 0)
         self._currents, self._motions = Track(plan.n_currents), Track(plan.n_motions)
         self._checks = np.zeros(len(Check), int)  # of PhaseCurrents since the last cycle was closed, by check
+        self._n_refused = 0  # of any message, since then
         self._dropped = False
         self._span: Span | None = None
         self._reasons = _NOTHING
@@ -72,6 +76,10 @@ class Assembly:
         self._motions.put(motions)
         if good.size:
             self._latest_ns = max(self._latest_ns, int(good["t_ns"].max()))
+
+    def note_refused(self, count: int) -> None:
+        """So many frames in this actuator's name were not authentic."""
+        self._n_refused += count
 
     def note_drop(self) -> None:
         """The kernel dropped frames, of whom is not known."""
@@ -175,8 +183,8 @@ class Assembly:
     def _take_tally(self, n_lost: int) -> Tally:
         n = self._checks
         bad = n[Check.CRC_ERROR] + n[Check.WRONG_LENGTH] + n[Check.WRONG_COUNTER]
-        tally = Tally(n_lost, int(n[Check.REORDERED]), int(n[Check.REPEATED]), int(bad))
-        self._checks = np.zeros_like(n)
+        tally = Tally(n_lost, int(n[Check.REORDERED]), int(n[Check.REPEATED]), int(bad), self._n_refused)
+        self._checks, self._n_refused = np.zeros_like(n), 0
         return tally
 
     def _motion(self, span: Span) -> dict[str, np.ndarray]:
@@ -195,10 +203,6 @@ def _first(condition: np.ndarray) -> int:
 
 def _seen(tally: Tally) -> Reason:
     reasons = _NOTHING
-    for count, reason in zip(
-        tally,
-        (Reason.LOST_FRAMES, Reason.REORDERED_FRAMES, Reason.REPEATED_FRAMES, Reason.CORRUPT_FRAMES),
-        strict=True,
-    ):
+    for count, reason in zip(tally, _OF_TALLY, strict=True):
         reasons |= reason if count else _NOTHING
     return reasons

@@ -45,12 +45,13 @@ class Span(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """What happened to a cycle's frames of PhaseCurrents."""
+    """What happened to a cycle's frames of PhaseCurrents; refused are those of any message of the actuator."""
 
     n_lost: int = 0
     n_reordered: int = 0
     n_repeated: int = 0
     n_corrupt: int = 0  # CRC, length or counter wrong
+    n_refused: int = 0  # not authentic
 
 
 @dataclass(frozen=True)

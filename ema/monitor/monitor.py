@@ -25,7 +25,8 @@ FIRST = "linear"  # the identifier of every cycle
 ARBITER = "lf2"  # says whether residuals too large for FIRST are the model's fault or only its linearisation's
 _DEGRADING = (
     Reason.LOST_FRAMES | Reason.SATURATED | Reason.START_STATE_UNKNOWN | Reason.MODEL_IN_DOUBT | Reason.OUT_OF_RANGE
-)
+    | Reason.AUTHENTICATION
+)  # fmt: skip
 
 
 class _Channel:

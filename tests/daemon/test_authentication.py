@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 from e2e.p05 import e2e_p05_protect
+from ema_daemon.settings import load
 
 from ema.bus import codec as codecs
 from ema.bus import identifiers
 from ema.bus.authentication import Sealer, Verifier
 from ema.bus.header import sequence
+from ema.bus.interface import elsewhere
 from ema.core import frames as fr
+from ema.core.status import Reason, Status
+from ema.log import LogReader, LogWriter
 from ema.monitor import Identified, Monitor
 from ema.monitor.settings import MonitorSettings
 
@@ -22,7 +26,7 @@ def estimates(coarse_bundle):
     def of(frames):
         monitor = Monitor({0: coarse_bundle}, CODEC, MonitorSettings.model_validate({"slower": {}}))
         outputs = [*monitor.update(frames), *monitor.finish()]
-        return np.array([o.estimate.k for o in outputs if isinstance(o, Identified)])
+        return [o.estimate for o in outputs if isinstance(o, Identified)], monitor.counts
 
     return of
 
@@ -55,16 +59,51 @@ def with_seals(frames):
 def let_through(frames):
     verifier = Verifier(CODEC, KEY)
     parts = [verifier.feed(part, int(part["t_ns"][-1])) for part in np.array_split(frames, 200)]
-    return np.concatenate([*parts, verifier.feed(fr.empty(0), 2**63)]), verifier.n_refused
+    return np.concatenate([*parts, verifier.feed(fr.empty(0), 2**63)])
 
 
-def test_forged_currents_change_no_estimate(frames, estimates):
-    true = estimates(frames)
-    passed, n_refused = let_through(with_forged(with_seals(frames)))
-    assert n_refused == with_forged(frames).size - frames.size > 250
-    assert np.array_equal(estimates(passed), true)
+def k(estimates):
+    return np.array([estimate.k for estimate in estimates])
 
 
-def test_without_a_key_they_do(frames, estimates):
-    """Or the test above would show nothing."""
-    assert not np.allclose(estimates(with_forged(frames)), estimates(frames), atol=0.01)
+def test_forged_currents_change_no_estimate_but_each_says_that_there_were_some(frames, estimates):
+    true, _ = estimates(frames)
+    found, counts = estimates(let_through(with_forged(with_seals(frames))))
+    assert counts.n_refused == with_forged(frames).size - frames.size > 250
+    assert counts.n_lost == 0
+    assert np.array_equal(k(found), k(true))
+    assert all(e.reasons == t.reasons | Reason.AUTHENTICATION for e, t in zip(found, true, strict=True))
+    assert all(e.status == max(t.status, Status.DEGRADED) for e, t in zip(found, true, strict=True))
+
+
+def test_refused_frames_are_evidence_in_the_log_and_replay_gives_the_same(frames, estimates, tmp_path):
+    passed = let_through(with_forged(with_seals(frames)))
+    with LogWriter(tmp_path) as log:
+        log.frames(passed, "vcan0")
+    with LogReader(tmp_path) as log:
+        logged = np.concatenate([part for _, part in log.frames()])
+    assert np.array_equal(logged, passed)
+    (live, n_live), (again, n_again) = estimates(passed), estimates(logged)
+    assert np.array_equal(k(live), k(again))
+    assert [e.reasons for e in live] == [e.reasons for e in again]
+    assert n_live == n_again
+
+
+def test_an_undisturbed_sealed_bus_says_nothing_of_it(frames, estimates):
+    found, counts = estimates(let_through(with_seals(frames)))
+    assert counts.n_refused == 0
+    assert not any(e.reasons & Reason.AUTHENTICATION for e in found)
+
+
+def test_without_a_key_forged_frames_are_taken(frames, estimates):
+    """Or the tests above would show nothing."""
+    assert not np.allclose(k(estimates(with_forged(frames))[0]), k(estimates(frames)[0]), atol=0.01)
+
+
+def test_another_bus_on_the_command_line_keeps_the_key(write_config, tmp_path):
+    """The service is started with `--bus vcan0`: its key must not be forgotten by that."""
+    settings = load(write_config(bus={"interface": "socketcan", "key_file": "key", "options": {"receive_buffer": 9}}))
+    assert settings.bus.key_file == tmp_path / "key"
+    same, other = elsewhere(settings.bus, "can1"), elsewhere(settings.bus, "virtual:x")
+    assert (same.channel, same.key_file, same.options) == ("can1", tmp_path / "key", {"receive_buffer": 9})
+    assert (other.interface, other.key_file, other.options) == ("virtual", tmp_path / "key", {})

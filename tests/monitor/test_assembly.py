@@ -83,7 +83,7 @@ def test_each_kind_of_damage_is_counted(assemble, bench, frames):
     frames = np.insert(frames, repeated + 1, frames[repeated])
     frames = np.delete(frames, lost)
     cycle = assemble(frames)[0][0]
-    assert cycle.tally == (2, 1, 1, 1)  # the damaged one is missing as well
+    assert cycle.tally == (2, 1, 1, 1, 0)  # the damaged one is missing as well
     assert cycle.reasons == (
         Reason.LOST_FRAMES | Reason.REORDERED_FRAMES | Reason.REPEATED_FRAMES | Reason.CORRUPT_FRAMES
     )
@@ -220,3 +220,19 @@ def test_what_the_kernel_dropped_is_noted_in_the_cycle(assemble, bench, frames):
 def test_status_values_keep_their_order():
     """The worse of two statuses is the larger one: what joins them relies on it."""
     assert Status.VALID < Status.DEGRADED < Status.INVALID < Status.NOT_ESTIMATED
+
+
+@pytest.mark.parametrize("gap", [0.001, 0.02, 0.2, 0.4], ids=lambda gap: f"after {gap:g} s")
+@pytest.mark.parametrize("stop", [0.02, 0.3, 0.7, 1.3, 2.3, 4.7], ids=lambda stop: f"at {stop:g} s")
+def test_an_actuator_restarted_at_any_moment_loses_no_cycle_beyond_the_one(flight, assemble, stop, gap):
+    """It counts from the beginning again, so that its frames look like those of before."""
+    frames = np.concatenate([frames for _, frames in flight])
+    begin = int(frames["t_ns"][0])
+    before = frames[frames["t_ns"] < begin + stop * 1e9]
+    after = frames.copy()
+    after["t_ns"] += np.uint64(int(before["t_ns"][-1]) - begin + int(gap * 1e9))
+    cycles, _ = assemble(np.concatenate([before, after]))
+    last, counted = cycles[-5:], Reason.CORRUPT_FRAMES | Reason.REPEATED_FRAMES  # the lost one's frames
+    assert [cycle.span.cycle for cycle in last] == [1, 2, 3, 4, 5]
+    assert not any(cycle.missing.any() or cycle.reasons & ~counted for cycle in last)
+    assert not any(cycle.reasons for cycle in last[1:])

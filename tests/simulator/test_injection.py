@@ -3,6 +3,7 @@ import pytest
 from ema_simulator.injection import FaultSource
 from ema_simulator.scenario import load
 
+from ema.bus.interface import open_bus, parse
 from ema.bus.protection import Sender
 
 TARGET = [0.1, 0.0, 0.3, 0.0, 0.0, 0.0]
@@ -47,3 +48,21 @@ def test_damaged_foreign_and_repeated_frames_are_not_obeyed(source, codec):
     for _ in range(3):
         faults.listen(control(codec, 2, TARGET, 0.0), t=1.0)
     assert faults.n_injections == 1
+
+
+def test_on_a_bus_with_a_key_only_sealed_injections_are_obeyed(source, codec, tmp_path):
+    key = tmp_path / "key"
+    key.write_text("5a" * 16)
+    key.chmod(0o600)
+    place = parse("virtual:injection")
+    locked, faults = place.model_copy(update={"key_file": key}), source("true")
+    with open_bus(locked, codec.filters("Tester")) as node, open_bus(place) as stranger, open_bus(locked) as tester:
+        stranger.write(control(codec, 2, TARGET, 0.0))
+        for _ in range(2):
+            faults.listen(node.read(0.1), t=1.0)
+        assert (faults.n_injections, faults.n_refused) == (0, 1)
+        tester.write(control(codec, 2, TARGET, 0.0))
+        faults.listen(node.read(1.0), t=1.0)
+        faults.listen(node.read(0.1), t=1.0)
+        assert (faults.n_injections, faults.n_refused) == (1, 1)
+        assert faults.at(2.0)[0] == pytest.approx(TARGET)
