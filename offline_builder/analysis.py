@@ -20,12 +20,13 @@ from . import noise
 from .config import Builder
 from .library import fit_library
 from .runs import Plan
+from .snapshots import READ, Snapshots
 
 THETA_U, THETA_M = STATE.index("theta_u"), STATE.index("theta_m")
 
 
 def jacobian(
-    envelopes: np.ndarray, plan: Plan, builder: Builder, i0: np.ndarray, noise_rms: float
+    envelopes: Snapshots, plan: Plan, builder: Builder, i0: np.ndarray, noise_rms: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """∂i/∂k at k = 0 over the whole cycle (n_t, 6), and the step taken for each fault (6,).
 
@@ -54,7 +55,7 @@ def tuned(plant: Actuator, i0: np.ndarray) -> lf1.Tuning:
 
 
 def analyse(
-    envelopes: np.ndarray, plan: Plan, plant: Actuator, builder: Builder, say: Callable[[str], None] = lambda text: None
+    envelopes: Snapshots, plan: Plan, plant: Actuator, builder: Builder, say: Callable[[str], None] = lambda text: None
 ) -> tuple[dict[str, np.ndarray], dict[str, float]]:
     """All arrays of the bundle, and the figures worth printing."""
     nominal = envelopes[plan.groups["nominal"]].astype(float)
@@ -65,8 +66,7 @@ def analyse(
     A_full, steps = jacobian(envelopes, plan, builder, i0, float(np.sqrt(np.mean(noise_rms**2))))
 
     say("POD")
-    campaign = envelopes[plan.groups["campaign"]]
-    modes = pod(campaign, i0, seed=builder.seed)
+    modes = pod(envelopes.part(plan.groups["campaign"]), i0, seed=builder.seed)
 
     say(f"schedule ({builder.schedule.method})")
     know = Knowledge(plant.time(), modes.v[:, 0], A_full, (nominal - i0).T @ (nominal - i0) / (len(nominal) - 1))
@@ -80,8 +80,9 @@ def analyse(
     sets = noise.heldout(envelopes, plan, builder, points)
     S = noise.switching(nominal[:, points], sets)
     A = A_full[points]
-    trained = np.concatenate([np.arange(len(plan))[plan.groups[name]] for name in ("campaign", "scaled")])
-    k, x = plan.k[trained], envelopes[:, points][trained].astype(float)
+    trained = [plan.groups[name] for name in ("campaign", "scaled")]
+    k = np.vstack([plan.k[group] for group in trained])
+    x = np.vstack([envelopes.part(group).at(points) for group in trained])
 
     def linear(k: np.ndarray) -> np.ndarray:
         return i0[points] + k @ A.T
@@ -90,7 +91,8 @@ def analyse(
     tuning = tuned(plant, i0)
 
     def lf1_at_points(k: np.ndarray) -> np.ndarray:
-        return lf1.simulate(plant, k, tuning)[:, points]
+        parts = np.split(k, range(READ, len(k), READ))
+        return np.vstack([lf1.simulate(plant, part, tuning)[:, points] for part in parts])
 
     models: dict[str, noise.Model] = {"lf2": lf2.at(points), "lf1": lf1_at_points}
     for name, model in models.items():

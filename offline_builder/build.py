@@ -14,6 +14,7 @@ from ema.models.actuator import Actuator
 
 from . import campaign
 from .analysis import analyse
+from .claim import claimed
 from .config import Builder
 from .runs import plan
 
@@ -34,11 +35,12 @@ def build(
 ) -> Bundle:
     """Run (or resume) the campaign and write the bundle; the work folder is removed when the bundle stands."""
     work = out.with_name(out.name + ".work")
-    runs = plan(builder, plant)
-    envelopes = campaign.run(runs, plant, work, pool, progress)
-    arrays, figures = analyse(envelopes, runs, plant, builder, say)
-    made = bundles.save(
-        out, plant, builder.model_dump(mode="json"), arrays, builder_hash=config.digest(builder), figures=figures
-    )
-    shutil.rmtree(work)
+    with claimed(work):
+        runs = plan(builder, plant)
+        envelopes = campaign.run(runs, plant, work, pool, progress)
+        arrays, figures = analyse(envelopes, runs, plant, builder, say)
+        made = bundles.save(
+            out, plant, builder.model_dump(mode="json"), arrays, builder_hash=config.digest(builder), figures=figures
+        )
+        shutil.rmtree(work)
     return made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -33,16 +34,16 @@ def build(config_path: Path, out: Path, workers: int | None, scheduler: str | No
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
     )
-    with bar, executor(workers, scheduler) as pool:
-        task = bar.add_task("HF runs", total=None)
-        made = phase.build(
-            builder,
-            plant,
-            out,
-            pool,
-            lambda done, of: bar.update(task, completed=done, total=of),
-            lambda text: console.print(f"  {text}"),
-        )
+    task = bar.add_task("HF runs", total=None)
+
+    def progress(done: int, of: int) -> None:
+        bar.start()  # not before it is known that the build can begin
+        bar.update(task, completed=done, total=of)
+
+    with ExitStack() as stack:
+        stack.callback(bar.stop)
+        pool = stack.enter_context(executor(workers, scheduler))
+        made = phase.build(builder, plant, out, pool, progress, lambda text: console.print(f"  {text}"))
     figures = made.manifest["figures"]
     click.echo(
         f"{out}: {len(made.schedule)} points ({builder.schedule.method}), λ1 share {figures['lambda_1_share']:.4f}, "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -28,7 +29,9 @@ def executor(workers: int | None = None, scheduler: str | None = None) -> Iterat
         Dask is not installed, or nobody answers at the address.
     """
     if scheduler is None:
-        with ProcessPoolExecutor(workers or os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        # Ctrl-C reaches every process of the terminal; it is this one's to stop the others.
+        ignore = (signal.SIGINT, signal.SIG_IGN)
+        with ProcessPoolExecutor(workers or os.cpu_count(), get_context("spawn"), signal.signal, ignore) as pool:
             yield pool
         return
     try:

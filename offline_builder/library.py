@@ -8,9 +8,10 @@ from ema.models.lf2 import Lf2
 
 from .config import Builder
 from .runs import Plan
+from .snapshots import Snapshots
 
 
-def fit_library(envelopes: np.ndarray, plan: Plan, builder: Builder, i0: np.ndarray) -> Lf2:
+def fit_library(envelopes: Snapshots, plan: Plan, builder: Builder, i0: np.ndarray) -> Lf2:
     """The library over the whole cycle."""
 
     def deviations(fault: str, levels: list[float]) -> np.ndarray:

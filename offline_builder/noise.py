@@ -11,6 +11,7 @@ from ema.identification.noise import spread
 
 from .config import Builder
 from .runs import START_OFFSET, Plan
+from .snapshots import Snapshots
 
 Model = Callable[[np.ndarray], np.ndarray]  # fault vectors (n, 6) → envelopes at the schedule (n, n_omega)
 Sets = list[tuple[np.ndarray, np.ndarray, np.ndarray]]  # see `heldout`
@@ -33,7 +34,7 @@ def shrunk(S: np.ndarray, n: int) -> np.ndarray:
     return (1.0 - share) * S + share * np.diag(np.diag(S))
 
 
-def heldout(envelopes: np.ndarray, plan: Plan, builder: Builder, points: np.ndarray) -> Sets:
+def heldout(envelopes: Snapshots, plan: Plan, builder: Builder, points: np.ndarray) -> Sets:
     """For each size of held-out faults: fault vectors (n, 6), first and second run at the schedule (n, n_omega)."""
     sets: Sets = []
     for k_max in builder.heldout.k_max:

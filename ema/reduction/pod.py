@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.linalg import eigh
 
 BLOCK = 512  # snapshots looked at together
+
+
+class Rows(Protocol):
+    """Snapshots as rows, of which a slice is an array: an array itself, or a file of them."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(n_s, n_times)."""
+
+    def __getitem__(self, rows: slice, /) -> np.ndarray: ...
 
 
 class Pod(NamedTuple):
@@ -18,12 +28,12 @@ class Pod(NamedTuple):
     share: np.ndarray
 
 
-def pod(snapshots: np.ndarray, i0: np.ndarray, r: int = 10, seed: int = 0) -> Pod:
+def pod(snapshots: Rows, i0: np.ndarray, r: int = 10, seed: int = 0) -> Pod:
     """First `r` modes of i(k) - i₀ by randomised SVD with power iterations, reading the snapshots block by block.
 
     Parameters
     ----------
-    snapshots : array or memory map, shape (n_s, n_times)
+    snapshots : Rows, shape (n_s, n_times)
         One envelope per row. [A]
     i0 : array, shape (n_times,)
         Reference signal in nominal condition. [A]
@@ -52,11 +62,11 @@ def pod(snapshots: np.ndarray, i0: np.ndarray, r: int = 10, seed: int = 0) -> Po
     return Pod(v=v, lam=lam, share=lam / max(total, np.finfo(float).tiny))
 
 
-def _gram_times(snapshots: np.ndarray, i0: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, float]:
+def _gram_times(snapshots: Rows, i0: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, float]:
     """(XᵀX) Q and the trace of XᵀX for X = snapshots - i₀, in one pass."""
     G = np.zeros_like(Q)
     total = 0.0
-    for first in range(0, len(snapshots), BLOCK):
+    for first in range(0, snapshots.shape[0], BLOCK):
         X = np.asarray(snapshots[first : first + BLOCK], dtype=float) - i0
         G += X.T @ (X @ Q)
         total += float(np.einsum("ij,ij->", X, X))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+import resource
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from ema_offline_builder import campaign
+from ema_offline_builder import campaign, snapshots
 from ema_offline_builder.build import build, read
+from ema_offline_builder.claim import claimed
 from ema_offline_builder.runs import plan
 
 from ema import bundle
@@ -55,7 +57,7 @@ def test_the_same_bits_from_one_worker_or_two_and_after_an_interruption(tiny, pl
     out = tmp_path / "bundle"
     with Breaking(2) as pool, pytest.raises(KeyboardInterrupt):
         build(tiny, plant, out, pool)
-    done = len(list((tmp_path / "bundle.work").glob("block_*.npy")))
+    done = sum((tmp_path / "bundle.work" / snapshots.DONE).read_bytes())
     assert 1 <= done <= 2
     assert not out.exists()
 
@@ -76,6 +78,52 @@ def test_another_configuration_does_not_take_over_unfinished_work(tiny, plant, t
     changed = tiny.model_copy(update={"seed": 8})
     with pytest.raises(BundleError, match="another configuration"):
         build(changed, plant, out, Counting())
+
+
+def test_two_builds_into_one_folder_do_not_meet(tiny, plant, tmp_path):
+    out = tmp_path / "bundle"
+    with claimed(tmp_path / "bundle.work"), pytest.raises(BundleError, match="another build is at work here"):
+        build(tiny, plant, out, Counting())
+    assert not out.exists()
+    with claimed(tmp_path / "bundle.work"):
+        pass
+
+
+def test_a_worker_that_dies_costs_only_its_own_runs(tiny, plant, tmp_path):
+    class Dying(Counting):
+        def submit(self, fn, /, *args, **kwargs):
+            if self.count < 2:
+                return super().submit(fn, *args, **kwargs)
+            future: Future = Future()
+            future.set_exception(BrokenExecutor())
+            return future
+
+    runs = plan(tiny, plant)
+    with pytest.raises(BundleError, match=rf"worker process died .* {2 * campaign.BLOCK} of {len(runs)} runs"):
+        campaign.run(runs, plant, tmp_path, Dying())
+    kept = snapshots.Snapshots(tmp_path, len(runs), plant.n_samples, campaign.BLOCK)
+    assert len(kept.missing()) == -(-len(runs) // campaign.BLOCK) - 2
+
+
+def test_no_room_on_the_disk_is_said_before_the_first_run(tiny, plant, tmp_path):
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000_000, limit[1]))
+    try:
+        with pytest.raises(BundleError, match=r"no room for the 0\.\d+ GB"):
+            campaign.run(plan(tiny, plant), plant, tmp_path, Counting())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+
+
+def test_rows_come_back_as_they_were_written(tmp_path):
+    rows = np.random.default_rng(1).standard_normal((70, 11)).astype(np.float32)
+    kept = snapshots.Snapshots(tmp_path, 70, 11, 32)
+    for block in reversed(kept.missing()):
+        kept.write(block, rows[block])
+    assert not snapshots.Snapshots(tmp_path, 70, 11, 32).missing()
+    assert np.array_equal(kept[:], rows)
+    assert np.array_equal(kept.part(slice(10, 60))[5:90], rows[15:60])
+    assert np.array_equal(kept.part(slice(10, 60)).at(np.array([3, 4])), rows[10:60, 3:5].astype(float))
 
 
 def test_the_jacobian_is_that_of_independent_runs(built, plant):

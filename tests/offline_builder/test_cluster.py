@@ -22,7 +22,7 @@ def test_a_worker_killed_in_mid_campaign_costs_nothing(tiny, plant, tmp_path, mo
     monkeypatch.setattr(campaign, "BLOCK", 32)
     runs = plan(tiny, plant)
     with ThreadPoolExecutor(1) as pool:
-        here = np.array(campaign.run(runs, plant, tmp_path / "here", pool))
+        here = campaign.run(runs, plant, _made(tmp_path / "here"), pool)[:]
 
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
@@ -34,7 +34,7 @@ def test_a_worker_killed_in_mid_campaign_costs_nothing(tiny, plant, tmp_path, mo
                 os.kill(victims.pop(), signal.SIGKILL)
 
         with executor(scheduler=cluster.scheduler_address) as pool:
-            there = np.array(campaign.run(runs, plant, tmp_path / "there", pool, kill))
+            there = campaign.run(runs, plant, _made(tmp_path / "there"), pool, kill)[:]
     assert not victims, "a worker was to be killed"
     assert np.array_equal(here, there)
 
@@ -43,3 +43,8 @@ def test_no_scheduler_there_is_one_line():
     pytest.importorskip("distributed")
     with pytest.raises(ConfigError, match="no Dask scheduler answers"), executor(scheduler="nonsense://"):
         pass
+
+
+def _made(folder):
+    folder.mkdir()
+    return folder
