@@ -13,7 +13,7 @@ from ema.bus.port import MAX_BATCH, Port
 from ema.core.frames import overflow_notice
 from ema.core.status import ServiceState
 from ema.log import LogWriter
-from ema.monitor import ARBITER, FIRST, Event, Identified, Job, Level, Monitor, Output, SampledEnvelope
+from ema.monitor import ARBITER, FIRST, Event, Identified, Job, Level, LostJob, Monitor, Output, SampledEnvelope
 
 from .health import Health
 from .notify import notify
@@ -128,7 +128,7 @@ class Service:
         if not self._workers[job.method].submit(job):
             self._health.n_skipped += 1
             text = f"{job.method}: cycle {job.cycle} is skipped, the worker is behind"
-            self._log_sink.event(Event(job.t_ns, Level.WARNING, "job_skipped", text, job.actuator))
+            self._log_sink.event(Event(job.t_ns, Level.WARNING, LostJob.SKIPPED, text, job.actuator))
 
     def _answer_jobs(self, workers: Iterable[Worker]) -> None:
         for worker in workers:
@@ -140,7 +140,7 @@ class Service:
             if isinstance(answer, Exception):
                 self._health.n_failed += 1
                 text = f"{job.method}: cycle {job.cycle} failed: {' '.join(str(answer).split()) or repr(answer)}"
-                self._log_sink.event(Event(job.t_ns, Level.ERROR, "job_failed", text, job.actuator))
+                self._log_sink.event(Event(job.t_ns, Level.ERROR, LostJob.FAILED, text, job.actuator))
             else:
                 self._put(self._monitor.conclude(job, answer))
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import yaml
 
 from ema.bundle import Bundle
@@ -17,9 +16,21 @@ from ema.bus import identifiers
 from ema.core import config
 from ema.core.errors import BundleError, LogError
 from ema.log import LogReader, Message, contents, schemas
-from ema.log.foreign import ForeignLog
 from ema.log.schemas import Encoded
-from ema.monitor import Event, Identified, Monitor, MonitorSettings, Output, Runner, SampledEnvelope, answers
+from ema.monitor import (
+    Event,
+    Identified,
+    Job,
+    LostJob,
+    Monitor,
+    MonitorSettings,
+    Output,
+    Runner,
+    SampledEnvelope,
+    answered,
+)
+
+from .received import Log, received, received_beside, worth_a_process
 
 _LOOK_AT = 20_000  # frames of a log without configuration, to see whose they are
 
@@ -42,7 +53,7 @@ class Setup:
     same: bool
 
 
-def setup(log: LogReader | ForeignLog, given: tuple[str, ...]) -> Setup:
+def setup(log: Log, given: tuple[str, ...]) -> Setup:
     """Bundles and settings by the log's attachments, and by what is `given`: PATH for all actuators, or NUMBER=PATH.
 
     Raises
@@ -72,10 +83,17 @@ def setup(log: LogReader | ForeignLog, given: tuple[str, ...]) -> Setup:
     return Setup(bundles, settings, len(same) == len(numbers) and all(same.values()))
 
 
-def identified(log: LogReader | ForeignLog, how: Setup, channels: tuple[str, ...] = ()) -> Iterator[Encoded | Message]:
+def identified(
+    log: Log, how: Setup, channels: tuple[str, ...] = (), n_processes: int | None = None
+) -> Iterator[Encoded | Message]:
     """The monitor's answers to all frames as the daemon would log them, and between them the estimates it logged.
 
     Memory does not grow with the log.
+
+    Parameters
+    ----------
+    n_processes : int, optional
+        1, or 2: the log is read beside; the answers are the same. Default: 2 for a long log.
 
     Yields
     ------
@@ -89,12 +107,25 @@ def identified(log: LogReader | ForeignLog, how: Setup, channels: tuple[str, ...
     LogError
         The frames are of several channels, and none was chosen.
     """
-    logged: list[Message] = []
-    monitor = Monitor(how.bundles, codecs.default(), how.settings)
-    for answer in answers(_frames(log, channels, logged), monitor, Runner(how.bundles)):
-        yield from _taken(logged)
-        yield _encoded(answer)
-    yield from _taken(logged)
+    beside = worth_a_process(log) if n_processes is None else n_processes > 1
+    monitor, runner = Monitor(how.bundles, codecs.default(), how.settings), Runner(how.bundles)
+    left_out = _left_out(log) if isinstance(log, LogReader) else set()
+    for item in (received_beside if beside else received)(log, how.bundles, how.settings, channels):
+        if isinstance(item, Message):
+            yield item
+        else:
+            outputs = (o for o in monitor.judge([item]) if not (isinstance(o, Job) and _job(o) in left_out))
+            yield from map(_encoded, answered(outputs, monitor, runner))
+
+
+def _job(job: Job) -> tuple[int, int | None, str]:
+    return job.t_ns, job.actuator, job.method
+
+
+def _left_out(log: LogReader) -> set[tuple[int, int | None, str]]:
+    """Jobs that a slower identifier, being behind, did not do: what they would have changed, the daemon never knew."""
+    events = (message.content for message in log.messages(lambda topic: topic == schemas.EVENT.topic))
+    return {(e["t_ns"], e["actuator"], e["text"].partition(":")[0]) for e in events if e.get("code") in set(LostJob)}
 
 
 def _encoded(answer: Output) -> Encoded:
@@ -107,26 +138,6 @@ def _encoded(answer: Output) -> Encoded:
     assert isinstance(answer, Event), "jobs are done by `answers`"
     event = contents.event(answer.t_ns, answer.level.value, answer.code, answer.text, answer.actuator)
     return schemas.EVENT.encode(event)
-
-
-def _frames(log: LogReader | ForeignLog, channels: tuple[str, ...], logged: list[Message]) -> Iterator[np.ndarray]:
-    """Frames for the monitor; logged estimates met on the way are put into `logged`."""
-    wanted = (schemas.FRAMES.topic, "/estimate/")
-    entries = log.entries(lambda topic: topic.startswith(wanted)) if isinstance(log, LogReader) else log.frames()
-    only = ""
-    for entry in entries:
-        if isinstance(entry, Message):
-            logged.append(entry)
-        elif not channels or entry.bus in channels:
-            only = only or entry.bus
-            if entry.bus != only:
-                raise LogError(f"the log holds frames of channels '{only}' and '{entry.bus}': choose one by --channel")
-            yield entry.frames
-
-
-def _taken(logged: list[Message]) -> Iterator[Message]:
-    yield from logged
-    logged.clear()
 
 
 def _configuration(attached: dict[str, bytes]) -> dict[str, Any]:
@@ -149,7 +160,7 @@ def _given(given: tuple[str, ...]) -> dict[int | None, str]:
     return chosen
 
 
-def _actuators_in(log: LogReader | ForeignLog) -> list[int]:
+def _actuators_in(log: Log) -> list[int]:
     """Whose currents the first frames of a log hold."""
     currents = codecs.default().messages["PhaseCurrents"].frame_id
     found: set[int] = set()

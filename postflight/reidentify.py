@@ -6,6 +6,7 @@ import csv
 import json
 import time
 from contextlib import ExitStack
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,22 +15,23 @@ import click
 from ema.core.errors import LogError, NegativeAnswer
 from ema.core.names import FAULTS
 from ema.log import LogReader, Message
-from ema.log.foreign import ForeignLog
 from ema.log.schemas import ESTIMATE
 from ema.log.segment import Segment
 
 from .compare import Comparison, Pair, Totals
 from .identify import Setup, identified, setup
+from .received import Log
 
 _COMMIT_EVERY = 1000  # messages
 
 
 def run(
-    log: LogReader | ForeignLog,
+    log: Log,
     given: tuple[str, ...],
     channels: tuple[str, ...],
     cycles: Path | None,
     out: Path | None,
+    n_processes: int | None,
     as_json: bool,
 ) -> None:
     """Identify, compare, print. NegativeAnswer when the bundle is the log's own and an estimate differs."""
@@ -39,7 +41,7 @@ def run(
         table = _CycleTable(cycles, opened) if cycles else None
         comparison = Comparison(table.write if table else lambda pair: None)
         target = _Target(out, log, how, opened) if out else None
-        for item in identified(log, how, channels):
+        for item in identified(log, how, channels, n_processes):
             if isinstance(item, Message):
                 comparison.logged(item.content)
                 continue
@@ -55,7 +57,12 @@ def run(
     for damage in getattr(log, "damage", []):
         click.echo(f"{damage}", err=True)
     if how.same and comparison.n_different:
-        raise NegativeAnswer(f"{comparison.n_different} estimates differ from the log's, though the bundle is the same")
+        largest = max(float(t.largest.max()) for t in comparison.totals.values())
+        made_by = log.metadata().get("software", "an unknown version") if isinstance(log, LogReader) else ""
+        raise NegativeAnswer(
+            f"{comparison.n_different} estimates differ from the log's by up to {largest:.2g} in k, though the bundle "
+            f"is the same (log made by {made_by}, identified by {version('ema-monitor')})"
+        )
 
 
 class _CycleTable:
@@ -84,7 +91,7 @@ class _CycleTable:
 class _Target:
     """A new log of the answers."""
 
-    def __init__(self, path: Path, log: LogReader | ForeignLog, how: Setup, opened: ExitStack):
+    def __init__(self, path: Path, log: Log, how: Setup, opened: ExitStack):
         attached = log.attachments() if isinstance(log, LogReader) else {}
         manifests = {f"manifest-{n}.json": json.dumps(b.manifest).encode() for n, b in how.bundles.items()}
         kept = {name: data for name, data in attached.items() if not name.startswith("manifest")}

@@ -34,6 +34,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--bundle", multiple=True, metavar="[N=]DIR", help="With --identify. Not the log's own (for actuator N).")
 @click.option("--cycles", metavar="FILE", type=_PATH, help="With --identify. CSV of the comparison cycle by cycle.")
 @click.option("--out", metavar="FILE", type=_PATH, help="With --identify. New MCAP log of the new estimates.")
+@click.option("--processes", type=click.IntRange(1, 2), help="With --identify. Default: 2 for a long log.")
 @click.option("--json", "as_json", is_flag=True, help="Answer for a machine.")
 def replay(
     logs: tuple[Path, ...], onto: tuple[str, ...], identify: bool, start: TimeOption, end: TimeOption, **how: Any
@@ -61,7 +62,7 @@ def replay(
         if identify:
             from .reidentify import run
 
-            run(log, how["bundle"], how["channel"], how["cycles"], how["out"], how["as_json"])
+            run(log, how["bundle"], how["channel"], how["cycles"], how["out"], how["processes"], how["as_json"])
         else:
             _send(log, _selection(how["ids"], how["channel"], how["rename"]), onto, how)
 

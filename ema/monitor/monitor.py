@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,15 +13,12 @@ from ema.bus.protection import Counts
 from ema.core.errors import ConfigError
 from ema.core.status import Reason, Status
 from ema.identification import METHODS, Estimate, identifier
-from ema.identification.sampling import Sampler
 
-from .assembler import Assembler
-from .cycles import AssembledCycle
 from .doubt import ModelDoubt
-from .outputs import Event, Identified, Job, Level, Output, SampledEnvelope
+from .outputs import FIRST, Event, Identified, Job, Level, Output, SampledEnvelope
+from .reception import Reception
 from .settings import MonitorSettings
 
-FIRST = "linear"  # the identifier of every cycle
 ARBITER = "lf2"  # says whether residuals too large for FIRST are the model's fault or only its linearisation's
 _DEGRADING = (
     Reason.LOST_FRAMES | Reason.SATURATED | Reason.START_STATE_UNKNOWN | Reason.MODEL_IN_DOUBT | Reason.OUT_OF_RANGE
@@ -35,7 +32,6 @@ class _Channel:
     def __init__(self, bundle: Bundle, settings: MonitorSettings):
         self.t = bundle.t[bundle.schedule]
         self.noise = bundle.noise(FIRST)
-        self.sampler = Sampler(bundle.plant, bundle.schedule)
         self.identifier = identifier(FIRST, bundle)
         self.doubts = {method: ModelDoubt(settings.model_check) for method in (FIRST, *settings.slower)}
         self.chosen = dict.fromkeys(settings.slower, -1)  # interval of the last cycle chosen
@@ -63,17 +59,17 @@ class Monitor:
             raise ConfigError(f"monitor.slower: identifier '{unknown[0]}' is unknown; known: {known}")
         self._settings = settings
         self._channels = {number: _Channel(bundle, settings) for number, bundle in bundles.items()}
-        self._assembler = Assembler(codec, {number: b.plant for number, b in bundles.items()}, settings)
+        self._reception = Reception(bundles, codec, settings)
         self.n_cycles = self.n_estimates = 0
 
     @property
     def counts(self) -> Counts:
         """What happened to frames since the start."""
-        return self._assembler.receiver.counts
+        return self._reception.counts
 
     def time_outs(self, now_ns: int) -> list[tuple[str, int]]:
         """Messages that are sent at a period and did not come in time, with their actuators; each told once."""
-        return self._assembler.time_outs(now_ns)
+        return self._reception.time_outs(now_ns)
 
     def update(self, frames: np.ndarray) -> list[Output]:
         """Take frames in the order they were received, shape (n,), FRAME_DTYPE; in batches of any size."""
@@ -81,32 +77,27 @@ class Monitor:
 
     def stream(self, frames: np.ndarray) -> Iterator[Output]:
         """As `update`, each answer as soon as it is found; to be exhausted before the next frames are given."""
-        yield from self._answers(self._assembler.feed(frames))
+        yield from self.judge(self._reception.feed(frames))
 
     def finish(self) -> list[Output]:
         """No more frames will come: close what is open."""
-        return list(self._answers(self._assembler.finish()))
+        return list(self.judge(self._reception.finish()))
 
     def conclude(self, job: Job, estimate: Estimate) -> list[Output]:
         """Take the answer to a job; those of one method in the order of their jobs."""
         return list(self._concluded(job, estimate))
 
-    def _answers(self, seen: Iterator[AssembledCycle | Event]) -> Iterator[Output]:
-        for item in seen:
-            if isinstance(item, AssembledCycle):
+    def judge(self, received: Iterable[Job | Event]) -> Iterator[Output]:
+        """Answers to what a `Reception` gave, in its order; `stream` and `finish` do both halves."""
+        for item in received:
+            if isinstance(item, Job):
                 yield from self._answer(item)
             else:
                 yield item
 
-    def _answer(self, cycle: AssembledCycle) -> Iterator[Output]:
-        channel = self._channels[cycle.actuator]
-        motion = cycle.motion
-        measurement = channel.sampler.measurement(cycle.i, cycle.missing, motion["theta_u"][0], motion["theta_m"][0])
-        reasons = cycle.reasons
-        if channel.sampler.saturated(cycle.i):
-            reasons |= Reason.SATURATED
-        job = Job(cycle.t_ns, cycle.actuator, cycle.span.cycle, FIRST, measurement, reasons)
-        estimate = channel.identifier.estimate(measurement)
+    def _answer(self, job: Job) -> Iterator[Output]:
+        channel = self._channels[job.actuator]
+        estimate = channel.identifier.estimate(job.measurement)
         outputs = list(self._concluded(job, estimate))
         self.n_cycles += 1
         usable = any(isinstance(o, Identified) and o.estimate.status <= Status.DEGRADED for o in outputs)

@@ -10,6 +10,8 @@ import numpy as np
 from ema.core.status import Reason
 from ema.identification import Estimate, Measurement
 
+FIRST = "linear"  # the identifier of every cycle
+
 
 class Level(StrEnum):
     """How serious an event is."""
@@ -17,6 +19,13 @@ class Level(StrEnum):
     INFO = "info"
     WARNING = "warning"
     ERROR = "error"
+
+
+class LostJob(StrEnum):
+    """Codes of events that say a job was not done; their text begins with the method."""
+
+    SKIPPED = "job_skipped"
+    FAILED = "job_failed"
 
 
 @dataclass(frozen=True)

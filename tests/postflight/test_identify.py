@@ -10,6 +10,7 @@ import pytest
 import yaml
 from click.testing import CliRunner
 from ema_daemon.sinks import LogSink
+from ema_postflight.export import export
 from ema_postflight.replay import replay
 
 from ema import bundle as bundles
@@ -75,8 +76,9 @@ def other_bundle(coarse_bundle, tmp_path_factory):
     return bundles.save(path, coarse_bundle.plant, {}, arrays)
 
 
-def test_with_the_same_bundle_every_estimate_is_the_same_to_the_last_bit(recorded):
-    answer = _run(recorded, "--identify", "--json")
+@pytest.mark.parametrize("n_processes", [1, 2])
+def test_with_the_same_bundle_every_estimate_is_the_same_to_the_last_bit(recorded, n_processes):
+    answer = _run(recorded, "--identify", "--processes", n_processes, "--json")
     assert answer.exit_code == 0, answer.output
     found = json.loads(answer.stdout)
     assert found["same_bundle"]
@@ -154,23 +156,54 @@ def test_a_bundle_built_again_in_the_same_place_is_not_taken_for_the_old_one(
         _run(log, "--identify")
 
 
-@pytest.mark.parametrize("suffix", ["log", "asc", "blf"])
-def test_raw_logs_of_other_tools_are_identified(recorded, coarse_bundle, tmp_path, suffix):
+@pytest.mark.parametrize("suffix", ["log", "asc", "blf", "mf4"])
+def test_raw_logs_of_other_tools_are_identified_as_the_daemon_did(recorded, coarse_bundle, tmp_path, suffix):
+    """Only the times of frames lose digits (µs), so every linear estimate is the same to the last bit."""
+    if suffix == "mf4":
+        pytest.importorskip("asammdf")
     path = tmp_path / f"raw.{suffix}"
     with LogReader(recorded) as log, can.Logger(path) as target:
         for _, frames in log.frames():
             for frame in frames:
                 target(message(frame, "can0"))
-    answer = _run(path, "--identify", "--bundle", coarse_bundle.path, "--json")
-    methods = {(m["actuator"], m["method"]): m for m in json.loads(answer.stdout)["methods"]}
-    assert methods[0, "linear"]["n_only_again"] == methods[7, "linear"]["n_only_again"] == 8
+    with LogReader(recorded) as log:
+        logged = [m.content for m in log.messages(lambda topic: topic.endswith("/linear"))]
+    _run(path, "--identify", "--bundle", coarse_bundle.path, "--out", tmp_path / "again.mcap")
+    with LogReader(tmp_path / "again.mcap") as log:
+        again = [m.content for m in log.messages(lambda topic: topic.endswith("/linear"))]
+    assert [(c["actuator"], c["cycle"], c["k"], c["sd"]) for c in again] == [
+        (c["actuator"], c["cycle"], c["k"], c["sd"]) for c in logged
+    ]
 
 
-def test_what_cannot_be_done_is_said_in_one_line(recorded, tmp_path):
-    with LogReader(recorded) as log, can.Logger(tmp_path / "raw.log") as target:
-        for bus, frames in log.frames():
-            for frame in frames[:5]:
-                target(message(frame, "can0" if bus else "can1"))
+def test_without_asammdf_an_mf4_log_is_refused_in_one_line(recorded, tmp_path, monkeypatch):
+    monkeypatch.setattr("can.io.mf4.asammdf", None)
+    (tmp_path / "x.mf4").write_bytes(b"MDF     4.10")
+    with pytest.raises(LogError, match=r"x\.mf4: needs a package that is not installed .*ema-monitor\[logs\]"):
+        _run(tmp_path / "x.mf4", "--identify")
+    with pytest.raises(LogError, match=r"y\.mf4: .*asammdf") as error:
+        CliRunner().invoke(export, [str(recorded), "--out", str(tmp_path / "y.mf4")], catch_exceptions=False)
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "y.mf4").exists()
+
+
+def _two_channels(recorded, path):
+    with LogReader(recorded) as log, can.Logger(path) as target:
+        for _, frames in log.frames():
+            for number, frame in enumerate(frames[:5]):
+                target(message(frame, f"can{number % 2}"))
+    return path
+
+
+def test_what_cannot_be_done_is_said_in_one_line(recorded, coarse_bundle, tmp_path):
+    _two_channels(recorded, tmp_path / "raw.log")
+    with pytest.raises(LogError, match="names no bundle"):
+        _run(tmp_path / "raw.log", "--identify")
+    with pytest.raises(BundleError, match="is not a bundle"):
+        _run(recorded, "--identify", "--bundle", tmp_path)
+    raw = tmp_path / "raw.log"
+    with pytest.raises(LogError, match="choose one by --channel"):  # met by the process that reads
+        _run(raw, "--identify", "--bundle", coarse_bundle.path, "--processes", 2)
     with pytest.raises(LogError, match="names no bundle"):
         _run(tmp_path / "raw.log", "--identify")
     with pytest.raises(BundleError, match="is not a bundle"):
