@@ -1,4 +1,4 @@
-"""The kernels: time per step and run, against the fastest equivalent kernel seen on such a machine (C, AVX-512)."""
+"""The kernels: time per step and run, against the fastest equivalent kernel on file and other simulators beside it."""
 
 from __future__ import annotations
 
@@ -12,35 +12,47 @@ from ema.core import config, resources
 from ema.models import hf, lf1
 from ema.models.actuator import Actuator
 
+from . import peers
+
 SEED = 1
+# An equivalent state machine in C, AVX-512 through `target_clones`, on a Sapphire Rapids at about 2.6 GHz.
 BEST_LANES, BEST_SINGLE = 7.4, 55.0  # [ns] 16 runs in lockstep, one run
-GEM = 55.0  # [s per simulated s at 1 µs] gym-electric-motor 3.0, measured on such a machine
+MISSING = "not installed (extra: bench-peers)"
 
 
-def _best(f: Callable[[], Any], n: int = 5) -> float:
-    f()
+def _best(work: Callable[[], Any], n: int = 5) -> float:
+    """Processor time, the best of `n`. [s]"""
+    work()
     best = np.inf
     for _ in range(n):
-        begin = time.perf_counter()
-        f()
-        best = min(best, time.perf_counter() - begin)
+        began = time.process_time()
+        work()
+        best = min(best, time.process_time() - began)
     return best
 
 
 def rows() -> list[dict[str, Any]]:
     plant = config.load(resources.config("actuator.yaml"), Actuator)
-    steps = (plant.n_samples - 1) * 100
-    single = _best(lambda: hf.simulate(plant, np.zeros((1, 6)), seeds=SEED))
-    lanes = _best(lambda: hf.simulate(plant, np.zeros((16, 6)), seeds=SEED + np.arange(16)))
-    simplified = _best(lambda: lf1.simulate(plant, np.zeros((16, 6))))
+    steps = (plant.n_samples - 1) * round(1.0 / (plant.control.rate * hf.DT))
     duration = plant.motion.duration
-    return [
-        {"figure": "HF, one run", "value": 1e9 * single / steps, "unit": "ns/step", "limit": BEST_SINGLE, "seed": SEED},
-        {"figure": "HF, one run", "value": duration / single, "unit": "× real time", "seed": SEED},
-        {"figure": "HF, 16 runs", "value": 1e9 * lanes / steps / 16, "unit": "ns/step/run", "limit": BEST_LANES,
-         "seed": SEED},
-        {"figure": "HF, 16 runs", "value": 16 * duration / lanes, "unit": "× real time per core",
-         "peer": "gym-electric-motor (figure on file)", "peer_value": 1.0 / GEM, "seed": SEED},
-        {"figure": "5 000 runs (projected)", "value": 5000 / 16 * lanes, "unit": "s", "limit": 60.0, "seed": SEED},
-        {"figure": "LF1, 16 runs", "value": 1e3 * simplified / 16, "unit": "ms/run", "seed": SEED},
-    ]  # fmt: skip
+    single = _best(lambda: hf.simulate(plant, np.zeros((1, 6)), seeds=SEED))
+    lanes = _best(lambda: hf.simulate(plant, np.zeros((16, 6)), seeds=SEED + np.arange(16))) / 16
+    simplified = _best(lambda: lf1.simulate(plant, np.zeros((16, 6)))) / 16
+    found = [
+        ("HF, one run", 1e9 * single / steps, "ns of CPU/step", BEST_SINGLE, False),
+        ("HF, 16 runs as lanes", 1e9 * lanes / steps, "ns of CPU/step/run", BEST_LANES, False),
+        ("HF, 16 runs as lanes", duration / lanes, "× real time per core", hf.DT / (1e-9 * BEST_LANES), True),
+        ("Gauss-Newton step with HF (base, 6 columns, 9 seeds)", 16 * lanes, "s of CPU", None, False),
+        ("LF1, 16 runs as lanes", 1e3 * simplified, "ms of CPU/run", None, False),
+    ]
+    table = [
+        {"figure": figure, "value": value, "unit": unit, "limit": limit, "more": more, "seed": SEED}
+        for figure, value, unit, limit, more in found
+    ]
+    for name, seconds in peers.measured(plant).items():
+        for figure, value in (("one run", single), ("16 runs as lanes, each", lanes)):
+            table.append(
+                {"figure": f"one second at 1 µs, HF, {figure}", "value": value / duration, "unit": "s of CPU",
+                 "peer": name if seconds else f"{name}: {MISSING}", "peer_value": seconds, "seed": SEED}
+            )  # fmt: skip
+    return table
