@@ -10,7 +10,7 @@ import numpy as np
 
 from ema.bus.codec import Codec
 from ema.bus.port import MAX_BATCH, Port
-from ema.core.frames import overflow_notice
+from ema.core.frames import joined, overflow_notice
 from ema.core.status import ServiceState
 from ema.log import LogWriter
 from ema.monitor import ARBITER, FIRST, Event, Identified, Job, Level, LostJob, Monitor, Output, SampledEnvelope
@@ -81,7 +81,7 @@ class Service:
     def _ingest(self, frames: np.ndarray) -> None:
         if self._port.counters.kernel_drops != self._drops:
             self._drops = self._port.counters.kernel_drops
-            frames = np.concatenate([overflow_notice(int(frames["t_ns"][0])), frames])
+            frames = joined([overflow_notice(int(frames["t_ns"][0])), frames])
         self._log.frames(frames, self._port.name)
         self._settle(int(frames["t_ns"][-1]))
         self._put(self._monitor.stream(frames))

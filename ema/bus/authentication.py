@@ -92,7 +92,7 @@ class Sealer(_Authenticator):
                 seals += self._close_all(identifiers.actuator(frame_id), now_ns)
             elif len(pending) == PER_SEAL:
                 seals.append(self._close(frame_id, seal, now_ns))
-        return self._sender.protect(np.concatenate(seals)) if seals else fr.empty(0)
+        return self._sender.protect(fr.joined(seals))
 
     def _close_all(self, actuator: int, now_ns: int) -> list[np.ndarray]:
         ids = [i for i in self._pending if identifiers.actuator(i) == actuator]
@@ -156,7 +156,7 @@ class Verifier(_Authenticator):
                 self._waiting[self._n_arrived] = frame.copy()
                 self._by_number.setdefault((identifiers.data_id(frame_id), number), []).append(self._n_arrived)
         decided |= self._given_up(int(frames["t_ns"][-1]) if frames.size else now_ns)
-        return np.concatenate([decided[n] for n in sorted(decided)]) if decided else fr.empty(0)
+        return fr.joined([decided[n] for n in sorted(decided)])
 
     def _unseal(self, message: Message, frame: np.ndarray) -> dict[int, np.ndarray]:
         """What a seal decides: once one frame shows that it is genuine, all the others with its numbers as well."""

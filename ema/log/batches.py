@@ -42,7 +42,7 @@ class Batcher:
     def _cut(self, keep_last: bool) -> Iterator[dict[str, Any]]:
         if self._count == 0:
             return
-        frames = np.concatenate(self._parts) if len(self._parts) > 1 else self._parts[0]
+        frames = raw.joined(self._parts) if len(self._parts) > 1 else self._parts[0]
         begin = 0
         while begin < len(frames):
             window = frames[begin : begin + MAX_COUNT]

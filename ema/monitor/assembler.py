@@ -23,7 +23,7 @@ from .settings import MonitorSettings
 
 _ERROR, _TX = int(FrameFlag.ERROR), int(FrameFlag.TX)
 RECEIVED = ("CycleStart", "CycleEnd", "PhaseCurrents", "Motion", "Supply")
-_MANY = 256  # frames that wait at most
+_MANY = 512  # frames that wait at most
 _CHIRP = 0  # motion_kind in the DBC
 
 
@@ -45,7 +45,8 @@ def _joined(batches: list[_Batch]) -> _Batch:
         return batches[0]
     if not batches:
         return _Batch(fr.empty(0), *(np.zeros(0, kind) for kind in (np.uint8, np.int64, np.uint32, np.uint32)))
-    return _Batch(*(np.concatenate(columns) for columns in zip(*batches, strict=True)))
+    frames, *columns = zip(*batches, strict=True)
+    return _Batch(fr.joined(frames), *map(np.concatenate, columns))
 
 
 class Assembler:
@@ -64,6 +65,7 @@ class Assembler:
         self._codec = codec
         self._plants = plants
         self._waiting: list[_Batch] = []
+        self._n_waiting = 0
         ids = {name: codec.messages[name].frame_id for name in RECEIVED}
         self._start, self._end, self._currents, self._motion, _ = ids.values()
         timeout_ns, grace_ns = round(settings.timeout * 1e9), round(settings.grace * 1e9)
@@ -89,7 +91,7 @@ class Assembler:
     def finish(self) -> Iterator[AssembledCycle | Event]:
         """Close what is open, because no more frames will come."""
         yield from self._place(_joined(self._waiting))
-        self._waiting = []
+        self._waiting, self._n_waiting = [], 0
         for assembly in self._assemblies.values():
             for cycle in assembly.finish():
                 yield from self._closed(assembly, cycle)
@@ -104,15 +106,20 @@ class Assembler:
 
         What is placed later is placed the same: the frames' own times decide, not the batches.
         """
+        if not batch.frames.size:
+            return None
         self._waiting.append(batch)
-        if not batch.frames.size or not (
-            sum(part.frames.size for part in self._waiting) >= _MANY
-            or ((batch.message == self._start) | (batch.message == self._end)).any()
+        self._n_waiting += batch.frames.size
+        latest_ns = int(batch.t_ns.max())
+        if not (
+            self._n_waiting >= _MANY
+            or (batch.message == self._start).any()
+            or (batch.message == self._end).any()
             or is_overflow(batch.frames).any()
-            or any(assembly.may_be_due(int(batch.t_ns.max())) for assembly in self._assemblies.values())
+            or any(assembly.may_be_due(latest_ns) for assembly in self._assemblies.values())
         ):
             return None
-        gathered, self._waiting = _joined(self._waiting), []
+        gathered, self._waiting, self._n_waiting = _joined(self._waiting), [], 0
         return gathered
 
     def _checked(self, frames: np.ndarray) -> _Batch:
