@@ -17,8 +17,10 @@ import numpy as np
 from ema.core.config import digest, validate
 from ema.core.errors import BundleError
 from ema.core.names import FAULTS
-from ema.identification.known_error import N_TERMS, KnownError
+from ema.faults import N_FAULTS
+from ema.identification.known_error import KnownError, n_terms
 from ema.identification.noise import NoiseModel
+from ema.identification.nuisance import Nuisance
 from ema.models.actuator import Actuator
 from ema.models.lf2 import Lf2
 
@@ -31,13 +33,14 @@ SHAPES = {
     "noise_switching": ("n_omega", "n_omega"), "noise_start": ("n_omega", "n_omega"), "start_B": ("n_omega", 2),
     "start_scale": (2,), "noise_sizes": ("n_levels",), "noise_spreads": (2,),
     "noise_linear": (2, "n_levels", "n_omega", "n_omega"), "noise_lf2": (2, "n_levels", "n_omega", "n_omega"),
-    "error_lf2": (N_TERMS, "n_omega"), "noise_lf1": (2, "n_levels", "n_omega", "n_omega"),
-    "error_lf1": (N_TERMS, "n_omega"), "lf1_tuning": (2,),
+    "error_lf2": ("n_terms", "n_omega"), "noise_lf1": (2, "n_levels", "n_omega", "n_omega"),
+    "error_lf1": ("n_terms", "n_omega"), "lf1_tuning": (2,),
     "noise_rms": ("n_t",),
     "i_SF": ("n_t",), "i_PH": (3, "n_t"), "f1": ("n_f1",), "f2": ("n_f2",),
     "k2_levels": ("n_k2",), "i_BLK": ("n_k2", "n_t"),
     "k6_levels": ("n_k6",), "i_zeta": ("n_k6", "n_t"),
 }  # fmt: skip
+NUISANCE_SHAPES = {"nuisance_A": ("n_omega", "m")}  # of a bundle that carries nuisance parameters
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,19 @@ class Bundle:
     def A(self) -> np.ndarray:
         """Jacobian at the schedule, shape (n_omega, 6). [A]"""
         return self.arrays["A"]
+
+    @property
+    def N(self) -> np.ndarray:
+        """Jacobian of the nuisance parameters at the schedule, shape (n_omega, m). [A]"""
+        return self.arrays.get("nuisance_A", np.zeros((len(self.schedule), 0)))
+
+    @cached_property
+    def nuisance(self) -> Nuisance:
+        """What is estimated beside the faults; mostly nothing."""
+        found = _carried(self)
+        if not len(found):
+            return found
+        return found.seen(np.hstack([self.A, self.N]), self.arrays["noise_switching"])
 
     def lf2(self) -> Lf2:
         """The LF2 library over the whole cycle."""
@@ -174,9 +190,21 @@ def _array(path: Path, name: str, entry: Any) -> np.ndarray:
     return array
 
 
+def _carried(bundle: Bundle) -> Nuisance:
+    """The manifest's entry 'nuisance'."""
+    try:
+        return Nuisance.of(bundle.manifest.get("nuisance", []))
+    except (KeyError, TypeError, ValueError) as error:
+        where = bundle.path / "manifest.json"
+        raise BundleError(f"{where}: entry 'nuisance' is damaged ({error!r})") from error
+
+
 def _check(bundle: Bundle) -> None:
-    size: dict[str, int] = {"n_t": bundle.plant.n_samples}
-    for name, shape in SHAPES.items():
+    m = len(_carried(bundle))
+    size: dict[str, int] = {"n_t": bundle.plant.n_samples, "n_terms": n_terms(N_FAULTS + m), "m": m}
+    for name, shape in (SHAPES | (NUISANCE_SHAPES if m else {})).items():
+        if name not in bundle.arrays:
+            raise BundleError(f"{bundle.path / 'manifest.json'}: lists no array '{name}'")
         array = bundle.arrays[name]
         if array.ndim != len(shape) or array.dtype.kind not in "fi":
             raise BundleError(f"{bundle.path / name}.npy: must be numbers of {len(shape)} dimensions")

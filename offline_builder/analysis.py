@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ema.core.names import FAULTS
+from ema.faults import N_FAULTS
 from ema.identification.known_error import KnownError
 from ema.models import lf1
 from ema.models.actuator import Actuator
@@ -43,6 +44,16 @@ def jacobian(
         columns.append(difference / step)
         steps.append(step)
     return np.column_stack(columns), np.array(steps)
+
+
+def nuisance_jacobian(envelopes: Snapshots, plan: Plan, n_t: int) -> np.ndarray:
+    """∂i/∂ν at zero over the whole cycle, shape (n_t, m): central differences, one-sided at a bound."""
+    columns = []
+    for j, name in enumerate(plan.nuisance.names, N_FAULTS):
+        up, down = (plan.groups[f"step {name} {sign}"] for sign in ("+1", "-1"))
+        distance = plan.x[up.start, j] - plan.x[down.start, j]
+        columns.append((envelopes[up].mean(axis=0, dtype=float) - envelopes[down].mean(axis=0, dtype=float)) / distance)
+    return np.column_stack(columns) if columns else np.zeros((n_t, 0))
 
 
 def tuned(plant: Actuator, i0: np.ndarray) -> lf1.Tuning:
@@ -81,22 +92,24 @@ def analyse(
     S = noise.switching(nominal[:, points], sets)
     A = A_full[points]
     trained = [plan.groups[name] for name in ("campaign", "scaled")]
-    k = np.vstack([plan.k[group] for group in trained])
-    x = np.vstack([envelopes.part(group).at(points) for group in trained])
+    at = np.vstack([plan.x[group] for group in trained])
+    i = np.vstack([envelopes.part(group).at(points) for group in trained])
+    N = nuisance_jacobian(envelopes, plan, plant.n_samples)[points]
 
-    def linear(k: np.ndarray) -> np.ndarray:
-        return i0[points] + k @ A.T
+    def linear(x: np.ndarray) -> np.ndarray:
+        return i0[points] + x @ np.hstack([A, N]).T
 
     levels["linear"] = noise.model_error(linear, sets, S)
     tuning = tuned(plant, i0)
 
-    def lf1_at_points(k: np.ndarray) -> np.ndarray:
-        parts = np.split(k, range(READ, len(k), READ))
+    def lf1_at_points(x: np.ndarray) -> np.ndarray:
+        parts = np.split(x[:, :N_FAULTS], range(READ, len(x), READ))
         return np.vstack([lf1.simulate(plant, part, tuning)[:, points] for part in parts])
 
-    models: dict[str, noise.Model] = {"lf2": lf2.at(points), "lf1": lf1_at_points}
+    library = lf2.at(points)
+    models: dict[str, noise.Model] = {"lf2": lambda x: library(x[:, :N_FAULTS]), "lf1": lf1_at_points}
     for name, model in models.items():
-        known[name] = error = KnownError.fitted(k, x - model(k), noise.KNEE)
+        known[name] = error = KnownError.fitted(at, i - model(at), noise.KNEE)
         levels[name] = noise.model_error(noise.corrected(model, error), sets, S)
     sizes = [float(np.sqrt(np.mean(np.sum(k**2, axis=1)))) for k, _, _ in sets]
 
@@ -112,6 +125,7 @@ def analyse(
         "noise_sizes": np.array(sizes), "noise_spreads": noise.spreads(sets), "lf1_tuning": tuning.as_array(),
         **{f"noise_{name}": level for name, level in levels.items()},
         **{f"error_{name}": error.coefficients for name, error in known.items()},
+        **({"nuisance_A": N} if len(plan.nuisance) else {}),
         **{name: getattr(lf2, name) for name in Lf2.__dataclass_fields__ if name != "i0"},
     }  # fmt: skip
     figures = {

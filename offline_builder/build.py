@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
+from typing import Any
 
 from ema import bundle as bundles
 from ema.bundle import Bundle
@@ -16,6 +17,7 @@ from . import campaign
 from .analysis import analyse
 from .claim import claimed
 from .config import Builder
+from .nuisance import resolve
 from .runs import plan
 
 
@@ -36,11 +38,13 @@ def build(
     """Run (or resume) the campaign and write the bundle; the work folder is removed when the bundle stands."""
     work = out.with_name(out.name + ".work")
     with claimed(work):
-        runs = plan(builder, plant)
+        nuisance = resolve(builder, plant)
+        runs = plan(builder, plant, nuisance)
         envelopes = campaign.run(runs, plant, work, pool, progress)
         arrays, figures = analyse(envelopes, runs, plant, builder, say)
-        made = bundles.save(
-            out, plant, builder.model_dump(mode="json"), arrays, builder_hash=config.digest(builder), figures=figures
-        )
+        facts: dict[str, Any] = {"builder_hash": config.digest(builder), "figures": figures}
+        if len(nuisance):
+            facts["nuisance"] = nuisance.as_list()
+        made = bundles.save(out, plant, builder.model_dump(mode="json"), arrays, **facts)
         shutil.rmtree(work)
     return made

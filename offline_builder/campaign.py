@@ -22,9 +22,9 @@ BLOCK = 128  # runs per task: eight batches of lanes, half a second's work
 N_AHEAD = 64  # tasks submitted and not yet written: with 2.6 MB each, memory stays bounded whatever the campaign
 
 
-def envelopes(plant: Actuator, k: np.ndarray, seeds: np.ndarray, start: np.ndarray) -> np.ndarray:
+def envelopes(plant: Actuator, k: np.ndarray, seeds: np.ndarray, start: np.ndarray, effects: hf.Effects) -> np.ndarray:
     """Envelopes of a block of runs, shape (n, n_t), single precision. [A]"""
-    return hf.simulate(plant, k, seeds=seeds, start=start).envelope.astype(np.float32)
+    return hf.simulate(plant, k, seeds=seeds, start=start, effects=effects).envelope.astype(np.float32)
 
 
 def run(
@@ -60,7 +60,8 @@ def run(
         while waiting or ahead:
             while waiting and len(ahead) < N_AHEAD:
                 b = waiting.popleft()
-                ahead.append((b, pool.submit(envelopes, plant, plan.k[b], plan.seeds[b], plan.start[b])))
+                effects = plan.nuisance.effects(plan.x[b], plant.effects)
+                ahead.append((b, pool.submit(envelopes, plant, plan.k[b], plan.seeds[b], plan.start[b], effects)))
             block, future = ahead.popleft()
             snapshots.write(block, future.result())
             done += block.stop - block.start
@@ -78,6 +79,6 @@ def run(
 
 def _digest(plan: Plan) -> str:
     h = hashlib.sha256()
-    for array in (plan.k, plan.seeds, plan.start):
+    for array in (plan.x, plan.seeds, plan.start, plan.nuisance.scale):
         h.update(np.ascontiguousarray(array).tobytes())
     return h.hexdigest()

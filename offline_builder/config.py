@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from ema.core.config import Settings
 from ema.core.units import quantity
@@ -51,6 +51,19 @@ class Schedule(Settings):
     n_points: int = Field(default=30, ge=6, le=500)
 
 
+class NuisanceParameter(Settings):
+    """A parameter of an effect that the monitor estimates beside the faults; in the parameter's own unit."""
+
+    parameter: str = Field(pattern=r"^\w+\.\w+$", description="effect.parameter")
+    low: float | None = Field(default=None, description="bound; the effect's own if not given")
+    high: float | None = Field(default=None, description="bound; the effect's own if not given")
+    sd: float | Literal["interval"] | None = Field(
+        default=None,
+        description="standard deviation known beforehand, about the plant's value; 'interval': from the plant's "
+        "interval of 95 %, as `ema discrepancy` wrote it; if not given, anything within the bounds is as likely",
+    )
+
+
 class Builder(Settings):
     """The whole offline phase."""
 
@@ -64,3 +77,11 @@ class Builder(Settings):
     jacobian: Jacobian
     library: Library
     schedule: Schedule = Schedule()
+    nuisance: list[NuisanceParameter] = Field(
+        default_factory=list, max_length=4, description="what is estimated beside the faults: effect.parameter, …"
+    )
+
+    @field_validator("nuisance", mode="before")
+    @classmethod
+    def _plain_names(cls, value: Any) -> Any:
+        return [{"parameter": v} if isinstance(v, str) else v for v in value] if isinstance(value, list) else value

@@ -13,7 +13,7 @@ from .config import Builder
 from .runs import START_OFFSET, Plan
 from .snapshots import Snapshots
 
-Model = Callable[[np.ndarray], np.ndarray]  # fault vectors (n, 6) → envelopes at the schedule (n, n_omega)
+Model = Callable[[np.ndarray], np.ndarray]  # points x = [k; ν] (n, 6 + m) → envelopes at the schedule (n, n_omega)
 Sets = list[tuple[np.ndarray, np.ndarray, np.ndarray]]  # see `heldout`
 KNEE = 0.15  # size ‖k‖ up to which the known error is to be followed to the noise
 
@@ -35,12 +35,12 @@ def shrunk(S: np.ndarray, n: int) -> np.ndarray:
 
 
 def heldout(envelopes: Snapshots, plan: Plan, builder: Builder, points: np.ndarray) -> Sets:
-    """For each size of held-out faults: fault vectors (n, 6), first and second run at the schedule (n, n_omega)."""
+    """For each size of held-out faults: points (n, 6 + m), first and second run at the schedule (n, n_omega)."""
     sets: Sets = []
     for k_max in builder.heldout.k_max:
         group = plan.groups[f"heldout {k_max:g}"]
         first, second = np.split(envelopes[group][:, points].astype(float), 2)
-        sets.append((plan.k[group][: len(first)], first, second))
+        sets.append((plan.x[group][: len(first)], first, second))
     return sets
 
 
@@ -61,7 +61,7 @@ def spreads(sets: Sets) -> np.ndarray:
 
 
 def halves(sets: Sets) -> tuple[Sets, Sets]:
-    """The sets' second halves, with few faults, and their first, with many; see `runs.heldout_faults`."""
+    """The sets' second halves, with few faults, and their first, with many; see `runs.heldout_points`."""
     n = len(sets[0][0]) // 2
     return [(k[n:], a[n:], b[n:]) for k, a, b in sets], [(k[:n], a[:n], b[:n]) for k, a, b in sets]
 

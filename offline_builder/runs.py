@@ -9,6 +9,7 @@ from scipy.stats import qmc
 
 from ema.core.names import FAULTS
 from ema.faults import N_FAULTS, backlash
+from ema.identification.nuisance import NONE, Nuisance
 from ema.models import hf
 from ema.models.actuator import Actuator
 
@@ -19,81 +20,97 @@ START_OFFSET = 2e-4  # [rad] stiction holds the user up to about this far from i
 
 @dataclass(frozen=True)
 class Plan:
-    """All runs: fault vectors `k` (n, 6), noise `seeds` (n,), `start` states (n, N_STATE); where each group lies."""
+    """All runs: points `x` = [k; ν] (n, 6 + m), noise `seeds` (n,), `start` states (n, N_STATE); where groups lie."""
 
-    k: np.ndarray
+    x: np.ndarray
     seeds: np.ndarray
     start: np.ndarray
     groups: dict[str, slice]
+    nuisance: Nuisance
+
+    @property
+    def k(self) -> np.ndarray:
+        """Fault vectors, shape (n, 6)."""
+        return self.x[:, :N_FAULTS]
 
     def __len__(self) -> int:
-        return len(self.k)
+        return len(self.x)
 
 
-def plan(builder: Builder, plant: Actuator) -> Plan:
+def plan(builder: Builder, plant: Actuator, nuisance: Nuisance = NONE) -> Plan:
     """Lay out the runs; the same configuration gives the same runs, run for run."""
+    d = N_FAULTS + len(nuisance)
+    low, high = nuisance.bounds
     groups: dict[str, np.ndarray] = {
-        "nominal": np.zeros((builder.n_noise, N_FAULTS)),
-        "campaign": latin_hypercube(builder.campaign.n_snapshots, builder.campaign.k_max, builder.seed),
+        "nominal": np.zeros((builder.n_noise, d)),
+        "campaign": latin_hypercube(builder.campaign.n_snapshots, builder.campaign.k_max, builder.seed, d),
     }
-    groups["scaled"] = scaled_hypercube(builder.campaign.n_snapshots, builder.campaign.k_max, builder.seed + 2)
+    groups["scaled"] = scaled_hypercube(builder.campaign.n_snapshots, builder.campaign.k_max, builder.seed + 2, d)
     for n, k_max in enumerate(builder.heldout.k_max):
-        k = heldout_faults(builder.heldout.n, k_max, builder.seed + 100 + n)
-        groups[f"heldout {k_max:g}"] = np.vstack([k, k])
+        x = heldout_points(builder.heldout.n, k_max, builder.seed + 100 + n, d)
+        groups[f"heldout {k_max:g}"] = np.vstack([x, x])
     for j, fault in enumerate(FAULTS):
         for step in builder.jacobian.steps:
-            groups[f"step {fault} {step:g}"] = _along(j, step, builder.n_seeds)
+            groups[f"step {fault} {step:g}"] = _along(j, step, builder.n_seeds, d)
+    for j, name in enumerate(nuisance.names, N_FAULTS):
+        for sign in (1.0, -1.0):
+            groups[f"step {name} {sign:+g}"] = _along(j, sign * builder.jacobian.steps[-1], builder.n_seeds, d)
     levels = builder.library
     sweeps = [levels.k1_levels, levels.k2_levels, *[levels.phase_levels] * 3, levels.k6_levels]
     for j, (fault, sweep) in enumerate(zip(FAULTS, sweeps, strict=True)):
         for level in sweep:
-            groups[f"level {fault} {level:g}"] = _along(j, level, builder.n_seeds)
-    groups["start"] = np.zeros((builder.n_start, N_FAULTS))
+            groups[f"level {fault} {level:g}"] = _along(j, level, builder.n_seeds, d)
+    groups["start"] = np.zeros((builder.n_start, d))
 
-    k = np.concatenate(list(groups.values()))
+    x = np.clip(np.concatenate(list(groups.values())), low, high)
     bounds = np.cumsum([0, *map(len, groups.values())])
     slices = {name: slice(int(a), int(b)) for name, a, b in zip(groups, bounds[:-1], bounds[1:], strict=True)}
-    start = hf.cold_start(plant, len(k))
-    start[slices["start"]] = random_starts(plant, k[slices["start"]], builder.seed + 1)
-    seeds = np.random.SeedSequence(builder.seed).generate_state(len(k), np.uint64).astype(np.int64) & (2**62 - 1)
-    return Plan(k=k, seeds=seeds, start=start, groups=slices)
+    start = hf.cold_start(plant, len(x))
+    start[slices["start"]] = random_starts(plant, x[slices["start"]], builder.seed + 1)
+    seeds = np.random.SeedSequence(builder.seed).generate_state(len(x), np.uint64).astype(np.int64) & (2**62 - 1)
+    return Plan(x=x, seeds=seeds, start=start, groups=slices, nuisance=nuisance)
 
 
-def latin_hypercube(n: int, k_max: float, seed: int) -> np.ndarray:
-    """Fault vectors within 0…k_max, shape (n, 6)."""
-    return qmc.LatinHypercube(N_FAULTS, rng=np.random.default_rng(seed)).random(n) * k_max
+def latin_hypercube(n: int, k_max: float, seed: int, d: int = N_FAULTS) -> np.ndarray:
+    """Points with faults within 0…k_max and nuisance parameters within ±k_max, shape (n, d)."""
+    return _centred(qmc.LatinHypercube(d, rng=np.random.default_rng(seed)).random(n)) * k_max
 
 
-def scaled_hypercube(n: int, k_max: float, seed: int) -> np.ndarray:
-    """Fault vectors of all sizes alike: within 0…κ, κ log-uniform from k_max/25 to k_max, every other with few faults.
+def scaled_hypercube(n: int, k_max: float, seed: int, d: int = N_FAULTS) -> np.ndarray:
+    """The same of all sizes alike: within 0…κ, κ log-uniform from k_max/25 to k_max, every other with few elements.
 
-    Shape (n, 6).
+    Shape (n, d).
     """
-    u = qmc.LatinHypercube(N_FAULTS + 1, rng=np.random.default_rng(seed)).random(n)
-    k = u[:, :N_FAULTS] * k_max * 25.0 ** (u[:, N_FAULTS:] - 1.0)
-    k[::2] = few(k[::2], seed)
-    return np.minimum(k, 1.0)
+    u = qmc.LatinHypercube(d + 1, rng=np.random.default_rng(seed)).random(n)
+    x = _centred(u[:, :d]) * k_max * 25.0 ** (u[:, d:] - 1.0)
+    x[::2] = few(x[::2], seed)
+    return np.minimum(x, 1.0)
 
 
-def heldout_faults(n: int, k_max: float, seed: int) -> np.ndarray:
-    """Fault vectors to measure model errors on, shape (n, 6): the first half with all faults, the second with few.
+def _centred(u: np.ndarray) -> np.ndarray:
+    """Unit hypercube → faults in 0…1, nuisance parameters in ±1."""
+    return np.hstack([u[:, :N_FAULTS], 2.0 * u[:, N_FAULTS:] - 1.0])
 
-    All have one size, ‖k‖ = √2 k_max, the root mean square of vectors drawn from 0…k_max.
+
+def heldout_points(n: int, k_max: float, seed: int, d: int = N_FAULTS) -> np.ndarray:
+    """Points to measure model errors on, shape (n, d): the first half with all elements, the second with few.
+
+    All have one size, ‖x‖ = √(d/3) k_max, the root mean square of vectors drawn from 0…k_max.
     """
-    k = latin_hypercube(n, k_max, seed)
-    k[n // 2 :] = few(k[n // 2 :], seed)
-    return np.minimum(np.sqrt(2.0) * k_max * k / np.linalg.norm(k, axis=1, keepdims=True), 1.0)
+    x = latin_hypercube(n, k_max, seed, d)
+    x[n // 2 :] = few(x[n // 2 :], seed)
+    return np.minimum(np.sqrt(d / 3.0) * k_max * x / np.linalg.norm(x, axis=1, keepdims=True), 1.0)
 
 
-def few(k: np.ndarray, seed: int) -> np.ndarray:
-    """Of each fault vector of `k` (n, 6) one to three faults alone, scaled to the mean size ‖k‖ of six.
+def few(x: np.ndarray, seed: int) -> np.ndarray:
+    """Of each point of `x` (n, d) one to three elements alone, scaled to the mean size ‖x‖ of all.
 
     A fault mostly grows alone, and models err differently there: what is known from vectors with all faults only is
     wrong for such.
     """
     rng = np.random.default_rng(seed)
-    kept = np.zeros_like(k)
-    for row, full in zip(kept, k, strict=True):
+    kept = np.zeros_like(x)
+    for row, full in zip(kept, x, strict=True):
         alone = rng.choice(len(row), rng.integers(1, 4), replace=False)
         row[alone] = full[alone] * np.sqrt(len(row) / len(alone))
     return kept
@@ -107,7 +124,7 @@ def random_starts(plant: Actuator, k: np.ndarray, seed: int) -> np.ndarray:
     return hf.start_at(plant, gear + gap, gear * plant.transmission.GR)
 
 
-def _along(j: int, level: float, n: int) -> np.ndarray:
-    k = np.zeros((n, N_FAULTS))
-    k[:, j] = level
-    return k
+def _along(j: int, level: float, n: int, d: int) -> np.ndarray:
+    x = np.zeros((n, d))
+    x[:, j] = level
+    return x

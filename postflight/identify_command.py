@@ -74,6 +74,17 @@ def _answer(number: int, e: Any) -> dict[str, Any]:
         "chi2": _finite([e.chi2])[0],
         "dof": e.dof,
         "unseparable": [dict(zip(FAULTS, map(float, d.round(3)), strict=True)) for d in e.unseparable],
+        **({"nuisance": _nuisance(e.nuisance)} if e.nuisance else {}),
+    }
+
+
+def _nuisance(beside: Any) -> dict[str, Any]:
+    """What was estimated beside the faults, by name."""
+    return {
+        name: {"value": float(value), "sd": float(sd), "low": float(low), "high": float(high), "unit": unit}
+        for name, unit, value, sd, (low, high) in zip(
+            beside.names, beside.units, beside.value, beside.sd, beside.interval95, strict=True
+        )
     }
 
 
@@ -102,6 +113,12 @@ def _say(answer: dict[str, Any]) -> None:
         values = "".join(f" {k:.4f} ± {sd:.4f} " for k, sd in zip(c["k"], c["sd"], strict=True))
         reasons = f" ({', '.join(c['reasons'])})" if c["reasons"] else ""
         click.echo(f"  {c['cycle']:>5}  {values}  {c['p_value']:7.4f}  {c['status']}{reasons}")
+        for name, n in c.get("nuisance", {}).items():
+            unit = "" if n["unit"] == "1" else f" {n['unit']}"
+            click.echo(
+                f"         beside the faults: {name} = {n['value']:.4g} ± {n['sd']:.2g}{unit} "
+                f"(95 %: {n['low']:.4g} … {n['high']:.4g})"
+            )
         for direction in c["unseparable"]:
             terms = " ".join(f"{v:+.2f} {name}" for name, v in direction.items() if abs(v) > 0.1)
             click.echo(f"         cannot be separated: {terms}")

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
+import sys
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the daemon: on thirty equations threads only spin
 
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -31,32 +35,61 @@ def shipped_plant() -> Actuator:
     return config.load(resources.config("actuator.yaml"), Actuator)
 
 
+COARSE = {
+    "plant": "actuator.yaml",
+    "seed": 11,
+    "campaign": {"n_snapshots": 120, "k_max": 0.3},
+    "heldout": {"n": 40, "k_max": [0.05, 0.2]},
+    "n_seeds": 12,
+    "n_noise": 120,
+    "n_start": 80,
+    "jacobian": {"steps": [0.03, 0.06]},
+    "library": {
+        "k1_levels": [0.1, 0.3, 0.6],
+        "k2_levels": [0.05, 0.15, 0.4, 0.8],
+        "phase_levels": [0.05, 0.15, 0.3],
+        "k6_levels": [0.1, 0.3, 0.6],
+        "degree_f2": 2,
+    },
+}
+
+
+def built(plant, folder, **changes):
+    """A bundle built in a few seconds: coarser than the quick one, good enough to see a fault."""
+    with ThreadPoolExecutor(2) as pool:
+        build(Builder.model_validate(COARSE | changes), plant, folder / "bundle", pool)
+    return bundle.load(folder / "bundle")
+
+
 @pytest.fixture(scope="session")
 def coarse_bundle(shipped_plant, tmp_path_factory):
-    """A bundle built in a few seconds: coarser than the quick one, good enough to see a fault."""
-    builder = Builder.model_validate(
-        {
-            "plant": "actuator.yaml",
-            "seed": 11,
-            "campaign": {"n_snapshots": 120, "k_max": 0.3},
-            "heldout": {"n": 40, "k_max": [0.05, 0.2]},
-            "n_seeds": 12,
-            "n_noise": 120,
-            "n_start": 80,
-            "jacobian": {"steps": [0.03, 0.06]},
-            "library": {
-                "k1_levels": [0.1, 0.3, 0.6],
-                "k2_levels": [0.05, 0.15, 0.4, 0.8],
-                "phase_levels": [0.05, 0.15, 0.3],
-                "k6_levels": [0.1, 0.3, 0.6],
-                "degree_f2": 2,
-            },
-        }
-    )
-    out = tmp_path_factory.mktemp("coarse") / "bundle"
-    with ThreadPoolExecutor(2) as pool:
-        build(builder, shipped_plant, out, pool)
-    return bundle.load(out)
+    """Of the shipped plant."""
+    return built(shipped_plant, tmp_path_factory.mktemp("coarse"))
+
+
+@pytest.fixture(scope="session")
+def flux_bundle(shipped_plant, tmp_path_factory):
+    """The same, which carries the magnets' flux beside the faults."""
+    more = {"campaign": {"n_snapshots": 400, "k_max": 0.3}, "nuisance": ["magnet_flux.change"]}
+    return built(shipped_plant, tmp_path_factory.mktemp("flux"), **more)
+
+
+@pytest.fixture(scope="session")
+def hidden() -> ModuleType:
+    """The independent actuator with flaws to hide (tests/support/hidden_actuator.py)."""
+    return support("hidden_actuator")
+
+
+def support(name: str) -> ModuleType:
+    """A module of tests/support."""
+    path = Path(__file__).parent / "support" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.fixture(scope="session")

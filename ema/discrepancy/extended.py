@@ -16,12 +16,13 @@ from .findings import FoundEffect
 def write_extended(
     plant_file: Path, effects: Iterable[FoundEffect], out: Path, fitted: Mapping[str, Any] | None = None
 ) -> None:
-    """Write `plant_file` with the effects' values; their intervals stand in comments at the top.
+    """Write `plant_file` with the effects' values and intervals of 95 %; what an engineer would say stands at the top.
 
     An effect found more than once (cogging lines) gets a number: ``cogging#2``. `fitted` replaces further keys.
     """
     data: dict[str, Any] = config.read_yaml(plant_file)
     declared: dict[str, dict[str, float]] = dict(data.get("effects") or {})
+    intervals: dict[str, dict[str, list[float]]] = dict(data.get("intervals") or {})
     comments = [f"# {plant_file.name} with what `ema discrepancy` found in measured records."]
     written: set[str] = set()
     for effect in effects:
@@ -34,14 +35,16 @@ def write_extended(
             **declared.get(key, {}),
             **{name: float(f"{q.value:.6g}") for name, q in effect.parameters.items()},
         }
+        intervals[key] = {
+            **intervals.get(key, {}),
+            **{name: [float(f"{x:.4g}") for x in (q.low, q.high)] for name, q in effect.parameters.items()},
+        }
         comments.append(f"# {effect.sentence}")
-        comments += [
-            f"#   {effect.name}.{name}: {q.low:.4g} … {q.high:.4g} [{q.unit}] (95 %)"
-            for name, q in effect.parameters.items()
-        ]
         if effect.indistinguishable_from:
             comments.append(f"#   or {', '.join(effect.indistinguishable_from)}; told apart by {effect.separated_by}")
     data["effects"] = declared
+    if intervals:
+        data["intervals"] = intervals
     data |= fitted or {}
     text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
     out.write_text("\n".join(comments) + "\n" + text, encoding="utf-8")

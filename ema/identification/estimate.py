@@ -8,6 +8,7 @@ import numpy as np
 
 from ema.core.status import Reason, Status
 
+from .nuisance import NuisanceEstimate, Rival
 from .truncated import Marginals
 
 
@@ -31,6 +32,10 @@ class Estimate:
         Distribution of each fault within its bounds, if there is an estimate.
     unseparable : tuple of array, shape (6,)
         Directions of k that this cycle's data leave open (unit vectors).
+    nuisance : NuisanceEstimate or None
+        What was estimated beside the faults, if the bundle carries nuisance parameters.
+    rivals : tuple of Rival
+        Explanations by other faults and nuisance parameters that fit as well; intervals hold them too.
     """
 
     method: str
@@ -45,7 +50,14 @@ class Estimate:
     reasons: Reason
     marginals: Marginals | None = None
     unseparable: tuple[np.ndarray, ...] = ()
+    nuisance: NuisanceEstimate | None = None
+    rivals: tuple[Rival, ...] = ()
 
     def interval(self, level: float) -> np.ndarray:
         """Shortest intervals that hold each fault with probability `level`, shape (6, 2); NaN without an estimate."""
-        return np.full((len(self.k), 2), np.nan) if self.marginals is None else self.marginals.shortest(level)
+        if self.marginals is None:
+            return np.full((len(self.k), 2), np.nan)
+        limits = self.marginals.shortest(level)
+        for rival in self.rivals:
+            limits = rival.widened(limits, level, slice(None, len(self.k)))
+        return np.clip(limits, 0.0, 1.0)

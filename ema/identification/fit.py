@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ema.core.status import Reason, Status
@@ -9,11 +11,13 @@ from ema.core.status import Reason, Status
 from .estimate import Estimate
 from .measurement import Measurement
 from .noise import NoiseModel
-from .truncated import in_unit_box
-from .weighted import Solution, Whitener, p_value
+from .nuisance import N_FAULTS, Nuisance, estimated, rivals
+from .truncated import Marginals, in_unit_box
+from .weighted import Solution, Whitener, bounded_least_squares, p_value
 
 AT_BOUND = 1e-9
 DOUBT_LEVEL = 1e-3  # share of sound cycles whose test of fit may fail
+PARTS = (slice(None, N_FAULTS), slice(N_FAULTS, None))
 OPEN = 0.15  # a direction of k with a larger standard deviation is called unseparable [share of a complete failure]
 
 
@@ -27,35 +31,68 @@ def not_estimated(method: str, measurement: Measurement, reasons: Reason) -> Est
     )
 
 
+class Problem(NamedTuple):
+    """Least squares about `x` = [k; ν] (6 + m,): Jacobian `A` (n_valid, 6 + m) and residual `r` (n_valid,). [A]"""
+
+    x: np.ndarray
+    A: np.ndarray
+    r: np.ndarray
+
+    def whitener(
+        self, measurement: Measurement, noise: NoiseModel, nuisance: Nuisance, x: np.ndarray, n_own: float = np.inf
+    ) -> Whitener:
+        """Weights for an answer near `x` by a model whose own answers are noisy as means of `n_own` runs are."""
+        v = np.ix_(measurement.valid, measurement.valid)
+        covariance = noise.covariance(measurement.start, x)
+        if np.isfinite(n_own):
+            covariance = covariance + noise.switching / n_own
+        if len(nuisance):
+            return Whitener(covariance[v] + nuisance.untrusted(x, self.A, noise.switching[v]))
+        return Whitener(covariance[v])
+
+    def whitened(self, white: Whitener, nuisance: Nuisance) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of unit variance, the prior's below those of the data."""
+        P = nuisance.prior
+        return np.vstack([white(self.A), P]), np.concatenate([white(self.r), -P @ self.x])
+
+    def solved(self, white: Whitener, nuisance: Nuisance) -> Solution:
+        """The step from `x` that stays within bounds."""
+        low, high = nuisance.bounds
+        return bounded_least_squares(*self.whitened(white, nuisance), low - self.x, high - self.x)
+
+
 def concluded(
     method: str,
     measurement: Measurement,
     noise: NoiseModel,
-    k: np.ndarray,
+    nuisance: Nuisance,
+    problem: Problem,
     solution: Solution,
-    residual: np.ndarray,
     white: Whitener,
 ) -> Estimate:
-    """Make the estimate.
-
-    Parameters
-    ----------
-    k : array, shape (6,)
-        Point of linearisation; the solution is the last step from there.
-    residual : array, shape (n_valid,)
-        Measured less modelled envelope after that step. [A]
-    """
-    answer, covariance = k + solution.x, solution.covariance
-    marginals = in_unit_box(k + solution.free, covariance)
+    """Make the estimate from the last step."""
+    x, residual = problem.x + solution.x, problem.r - problem.A @ solution.x
+    low, high = nuisance.bounds
+    span = high - low
+    inside = in_unit_box((problem.x + solution.free - low) / span, solution.covariance / np.outer(span, span))
+    marginals, beside = (Marginals(*(column[part] for column in inside)) for part in PARTS)
+    answer, covariance = x[:N_FAULTS], solution.covariance[:N_FAULTS, :N_FAULTS]
     sd = np.sqrt(marginals.variance + (marginals.mean - answer) ** 2)
     w = white(residual)
     chi2 = float(w @ w)
     at_bound = (answer <= AT_BOUND) | (answer >= 1.0 - AT_BOUND)
-    dof = max(len(residual) - int(np.sum(~at_bound)), 1)
+    dof = max(len(residual) - int(np.sum(~at_bound)) - len(nuisance), 1)
     p = p_value(chi2, dof)
     full = np.full(len(measurement.i_hat), np.nan)
     full[measurement.valid] = residual
     open_directions = unseparable(covariance)
+    nuisance_estimate, others = None, []
+    if len(nuisance):
+        A, b = problem.whitened(white, nuisance)
+        others = rivals(nuisance, A, b + A @ problem.x, x, solution.covariance)
+        differences = [other.x[:N_FAULTS] - answer for other in others]
+        open_directions += tuple(d / np.linalg.norm(d) for d in differences)
+        nuisance_estimate = estimated(nuisance, x, solution.covariance, beside, others)
     reasons = Reason(0)
     for reason, applies in (
         (Reason.AT_BOUND, at_bound.any()),
@@ -63,7 +100,7 @@ def concluded(
         (Reason.GAP_AT_SCHEDULE, not measurement.valid.all()),
         (Reason.MODEL_IN_DOUBT, p < DOUBT_LEVEL),
         (Reason.UNSEPARABLE, bool(open_directions)),
-        (Reason.OUT_OF_RANGE, noise.beyond(answer)),
+        (Reason.OUT_OF_RANGE, noise.beyond(x)),
     ):
         reasons |= reason if applies else Reason(0)
     status = Status.VALID
@@ -72,7 +109,8 @@ def concluded(
     if reasons & Reason.GAP_AT_SCHEDULE:
         status = Status.INVALID
     return Estimate(
-        *(method, answer, sd, covariance, chi2, dof, p, full, status, reasons), marginals, open_directions
+        *(method, answer, sd, covariance, chi2, dof, p, full, status, reasons), marginals, open_directions,
+        nuisance_estimate, tuple(others),
     )  # fmt: skip
 
 

@@ -15,12 +15,13 @@ import numpy as np
 from ema.core.status import Reason
 
 from .estimate import Estimate
-from .fit import concluded, enough, not_estimated
+from .fit import Problem, concluded, enough, not_estimated
 from .measurement import Measurement
 from .noise import NoiseModel
-from .weighted import Whitener, bounded_least_squares
+from .nuisance import NONE, Nuisance
+from .weighted import Whitener
 
-# (fault vectors (m, 6), start state (2,) or None) → envelopes at the schedule (m, n_omega)
+# (points x = [k; ν] (n, 6 + m), start state (2,) or None) → envelopes at the schedule (n, n_omega)
 Model = Callable[[np.ndarray, "np.ndarray | None"], np.ndarray]
 
 
@@ -39,74 +40,68 @@ class Options(NamedTuple):
     tolerance: float = 0.01
 
 
-class _Linearised(NamedTuple):
-    """Model about `k` (6,): Jacobian `A` (n_valid, 6) and measured less modelled envelope (n_valid,)."""
-
-    k: np.ndarray
-    A: np.ndarray
-    residual: np.ndarray
-
-
 class GaussNewton:
-    """Gauss–Newton on a model, weighted by the noise model, bounded to 0 ≤ k ≤ 1."""
+    """Gauss–Newton on a model, weighted by the noise model, bounded to 0 ≤ k ≤ 1; nuisance parameters beside k."""
 
     def __init__(self, method: str, model: Model, noise: NoiseModel, start_from: Callable[[Measurement], np.ndarray],
-                 options: Options = Options()):  # noqa: B008 - immutable  # fmt: skip
+                 options: Options = Options(), nuisance: Nuisance = NONE):  # noqa: B008 - immutable  # fmt: skip
         self.method, self.model, self.noise, self.start_from, self.options = method, model, noise, start_from, options
+        self.nuisance = nuisance
+        self._low, self._high = nuisance.bounds
 
     def estimate(self, measurement: Measurement) -> Estimate:
         """Iterate from the warm start until the step is small."""
         if not enough(measurement):
             return not_estimated(self.method, measurement, Reason.GAP_AT_SCHEDULE)
-        at = self._linearised(np.clip(self.start_from(measurement), 0.0, 1.0), measurement)
+        at = self._linearised(np.clip(self.start_from(measurement), self._low, self._high), measurement)
         seen, C = [at], 1.0
-        white = self._whitener(measurement, at.k)
+        white = self._whitener(measurement, at)
         while len(seen) < self.options.n_steps:
-            solution = bounded_least_squares(white(at.A), white(at.residual), -at.k, 1.0 - at.k)
+            solution = at.solved(white, self.nuisance)
             step = C * solution.x
             if np.max(np.abs(step) / np.sqrt(np.diag(solution.covariance))) < self.options.tolerance:
                 break
-            tried = self._linearised(at.k + step, measurement)
+            tried = self._linearised(at.x + step, measurement)
             seen.append(tried)
-            if np.sum(white(tried.residual) ** 2) < np.sum(white(at.residual) ** 2):
+            if self._cost(tried, white) < self._cost(at, white):
                 at, C = tried, min(1.0, 2.0 * C)
-                white = self._whitener(measurement, at.k)
+                white = self._whitener(measurement, at)
             else:
                 C *= 0.5
         at, n_averaged = self._averaged(at, seen)
-        white = self._whitener(measurement, at.k, n_averaged)
-        solution = bounded_least_squares(white(at.A), white(at.residual), -at.k, 1.0 - at.k)
-        residual = at.residual - at.A @ solution.x
-        return concluded(self.method, measurement, self.noise, at.k, solution, residual, white)
+        white = self._whitener(measurement, at, n_averaged)
+        solution = at.solved(white, self.nuisance)
+        return concluded(self.method, measurement, self.noise, self.nuisance, at, solution, white)
 
-    def _averaged(self, at: _Linearised, seen: list[_Linearised]) -> tuple[_Linearised, int]:
+    def _cost(self, at: Problem, white: Whitener) -> float:
+        return float(np.sum(white(at.r) ** 2) + np.sum((self.nuisance.prior @ at.x) ** 2))
+
+    def _averaged(self, at: Problem, seen: list[Problem]) -> tuple[Problem, int]:
         """Mean of all linearisations within one finite difference of `at`, and how many base runs went into it.
 
         A noisy model is asked more than once about nearly the same point; none of its answers should be lost.
         """
-        near = [x for x in seen if np.abs(x.k - at.k).max() <= self.options.dk]
-        A = np.mean([x.A for x in near], axis=0)
-        residual = np.mean([x.residual + A @ (x.k - at.k) for x in near], axis=0)
-        return _Linearised(at.k, A, residual), self.options.n_base * len(near)
+        near = [p for p in seen if np.abs(p.x - at.x).max() <= self.options.dk]
+        A = np.mean([p.A for p in near], axis=0)
+        residual = np.mean([p.r + A @ (p.x - at.x) for p in near], axis=0)
+        return Problem(at.x, A, residual), self.options.n_base * len(near)
 
-    def _whitener(self, measurement: Measurement, k: np.ndarray, n_averaged: int | None = None) -> Whitener:
-        v = measurement.valid
-        covariance = self.noise.covariance(measurement.start, k)
-        if self.options.n_base > 1:  # a noisy model: its own runs differ as measured ones do
-            covariance = covariance + self.noise.switching / (n_averaged or self.options.n_base)
-        return Whitener(covariance[np.ix_(v, v)])
+    def _whitener(self, measurement: Measurement, at: Problem, n_averaged: int | None = None) -> Whitener:
+        n = self.options.n_base  # more than one: a noisy model, whose own runs differ as measured ones do
+        n_own = (n_averaged or n) if n > 1 else np.inf
+        return at.whitener(measurement, self.noise, self.nuisance, at.x, n_own)
 
-    def _linearised(self, k: np.ndarray, measurement: Measurement) -> _Linearised:
-        """Differences stay within the bounds: one-sided (or shortened) where k is near one."""
-        o, v = self.options, measurement.valid
-        up, down = np.minimum(o.dk, 1.0 - k), np.minimum(o.dk, k)
+    def _linearised(self, x: np.ndarray, measurement: Measurement) -> Problem:
+        """Differences stay within the bounds: one-sided (or shortened) where x is near one."""
+        o, v, d = self.options, measurement.valid, len(x)
+        up, down = np.minimum(o.dk, self._high - x), np.minimum(o.dk, x - self._low)
         if not o.central:
             up, down = np.where(up >= down, up, 0.0), np.where(up >= down, 0.0, down)
-        sides = [k + np.diag(up), k - np.diag(down)] if o.central else [k + np.diag(up - down)]
-        i = self.model(np.vstack([np.tile(k, (o.n_base, 1)), *sides]), measurement.start)[:, v]
+        sides = [x + np.diag(up), x - np.diag(down)] if o.central else [x + np.diag(up - down)]
+        i = self.model(np.vstack([np.tile(x, (o.n_base, 1)), *sides]), measurement.start)[:, v]
         base = i[: o.n_base].mean(axis=0)
         if o.central:
-            A = (i[o.n_base : o.n_base + 6] - i[o.n_base + 6 :]) / (up + down)[:, None]
+            A = (i[o.n_base : o.n_base + d] - i[o.n_base + d :]) / (up + down)[:, None]
         else:
             A = (i[o.n_base :] - base) / (up - down)[:, None]
-        return _Linearised(k, A.T, measurement.i_hat[v] - base)
+        return Problem(x, A.T, measurement.i_hat[v] - base)

@@ -14,23 +14,25 @@ from ema.models import hf
 
 from . import lf2
 from .gauss_newton import GaussNewton, Options
+from .nuisance import N_FAULTS
 
 if TYPE_CHECKING:
     from ema.bundle import Bundle
 
-OPTIONS = Options(dk=0.08, central=True, n_base=4, n_steps=5, tolerance=0.1)  # 4 + 2·6 = 16 lanes
+OPTIONS = Options(dk=0.08, central=True, n_base=4, n_steps=5, tolerance=0.1)  # 4 + 2·6 = 16 lanes; two batches with ν
 SEED = 0x48460000  # of the model's noise; any but the measured actuator's own
 
 
 def make(bundle: Bundle, options: Options = OPTIONS) -> GaussNewton:
     """The HF identifier of a bundle."""
-    plant, schedule, noise = bundle.plant, bundle.schedule, bundle.noise("hf")
+    plant, schedule, noise, nuisance = bundle.plant, bundle.schedule, bundle.noise("hf"), bundle.nuisance
     first = lf2.make(bundle)
 
-    def model(k: np.ndarray, start: np.ndarray | None) -> np.ndarray:
+    def model(x: np.ndarray, start: np.ndarray | None) -> np.ndarray:
         theta_u, theta_g = np.hsplit(np.zeros(2) if start is None else start, 2)
         state = hf.start_at(plant, theta_u, theta_g * plant.transmission.GR)
-        seeds = SEED + np.arange(len(k)) + int(1e6 * np.abs(k).sum())
-        return hf.simulate(plant, k, seeds=seeds, start=state).envelope[:, schedule]
+        seeds = SEED + np.arange(len(x)) + int(1e6 * np.abs(x).sum())
+        runs = hf.simulate(plant, x[:, :N_FAULTS], seeds=seeds, start=state, effects=nuisance.effects(x, plant.effects))
+        return runs.envelope[:, schedule]
 
-    return GaussNewton("hf", model, noise, lambda measurement: first.estimate(measurement).k, options)
+    return GaussNewton("hf", model, noise, nuisance.started_by(first), options, nuisance)

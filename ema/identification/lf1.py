@@ -10,6 +10,7 @@ from ema.models import lf1
 
 from . import linear
 from .gauss_newton import GaussNewton, Options
+from .nuisance import N_FAULTS
 
 if TYPE_CHECKING:
     from ema.bundle import Bundle
@@ -22,7 +23,8 @@ def make(bundle: Bundle) -> GaussNewton:
     plant, tuning, error = bundle.plant, lf1.Tuning(*bundle.arrays["lf1_tuning"]), bundle.known_error("lf1")
     first = linear.make(bundle)
 
-    def model(k: np.ndarray, start: np.ndarray | None) -> np.ndarray:
-        return lf1.simulate(plant, k, tuning, start)[:, bundle.schedule] + error(k)
+    def model(x: np.ndarray, start: np.ndarray | None) -> np.ndarray:
+        return lf1.simulate(plant, x[:, :N_FAULTS], tuning, start)[:, bundle.schedule] + error(x)
 
-    return GaussNewton("lf1", model, bundle.noise("lf1"), lambda measurement: first.estimate(measurement).k, OPTIONS)
+    nuisance = bundle.nuisance
+    return GaussNewton("lf1", model, bundle.noise("lf1"), nuisance.started_by(first), OPTIONS, nuisance)

@@ -8,6 +8,7 @@ import numpy as np
 
 from . import linear
 from .gauss_newton import GaussNewton
+from .nuisance import N_FAULTS
 
 if TYPE_CHECKING:
     from ema.bundle import Bundle
@@ -18,7 +19,8 @@ def make(bundle: Bundle) -> GaussNewton:
     first, noise = linear.make(bundle), bundle.noise("lf2")
     library, error = bundle.lf2().at(bundle.schedule), bundle.known_error("lf2")
 
-    def model(k: np.ndarray, start: np.ndarray | None) -> np.ndarray:
-        return library(k) + error(k) + noise.start_shift(start)
+    def model(x: np.ndarray, start: np.ndarray | None) -> np.ndarray:
+        return library(x[..., :N_FAULTS]) + error(x) + noise.start_shift(start)
 
-    return GaussNewton("lf2", model, noise, lambda measurement: first.estimate(measurement).k)
+    nuisance = bundle.nuisance
+    return GaussNewton("lf2", model, noise, nuisance.started_by(first), nuisance=nuisance)

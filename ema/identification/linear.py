@@ -9,10 +9,10 @@ import numpy as np
 from ema.core.status import Reason
 
 from .estimate import Estimate
-from .fit import concluded, enough, not_estimated
+from .fit import Problem, concluded, enough, not_estimated
 from .measurement import Measurement
 from .noise import NoiseModel
-from .weighted import Whitener, bounded_least_squares
+from .nuisance import NONE, Nuisance
 
 if TYPE_CHECKING:
     from ema.bundle import Bundle
@@ -25,14 +25,16 @@ class Linear:
     ----------
     i0 : array, shape (n_omega,)
         Nominal envelope at the schedule. [A]
-    A : array, shape (n_omega, 6)
-        Jacobian ∂i/∂k at k = 0. [A]
+    A : array, shape (n_omega, 6 + m)
+        Jacobian ∂i/∂x at zero, x = [k; ν]. [A]
+    nuisance : Nuisance
+        What ν is, m elements.
     """
 
     method = "linear"
 
-    def __init__(self, i0: np.ndarray, A: np.ndarray, noise: NoiseModel):
-        self.i0, self.A, self.noise = i0, A, noise
+    def __init__(self, i0: np.ndarray, A: np.ndarray, noise: NoiseModel, nuisance: Nuisance = NONE):
+        self.i0, self.A, self.noise, self.nuisance = i0, A, noise, nuisance
 
     def estimate(self, measurement: Measurement) -> Estimate:
         """Solve (3); the covariance of the residual is that of the size of faults found in a first pass."""
@@ -40,15 +42,16 @@ class Linear:
             return not_estimated(self.method, measurement, Reason.GAP_AT_SCHEDULE)
         v = measurement.valid
         delta = (measurement.i_hat - self.i0 - self.noise.start_shift(measurement.start))[v]
-        A, low, high = self.A[v], np.zeros(6), np.ones(6)
-        k = np.zeros(6)
+        x = np.zeros(self.A.shape[1])
+        problem = Problem(x, self.A[v], delta)
         for _ in range(3):  # weights depend on the size of the faults, and the other way round
-            white = Whitener(self.noise.covariance(measurement.start, k)[np.ix_(v, v)])
-            solution = bounded_least_squares(white(A), white(delta), low, high)
-            k = solution.x
-        return concluded(self.method, measurement, self.noise, np.zeros(6), solution, delta - A @ k, white)
+            white = problem.whitener(measurement, self.noise, self.nuisance, x)
+            solution = problem.solved(white, self.nuisance)
+            x = solution.x
+        return concluded(self.method, measurement, self.noise, self.nuisance, problem, solution, white)
 
 
 def make(bundle: Bundle) -> Linear:
     """The linear identifier of a bundle."""
-    return Linear(bundle.i0[bundle.schedule], bundle.A, bundle.noise("linear"))
+    A = np.hstack([bundle.A, bundle.N])
+    return Linear(bundle.i0[bundle.schedule], A, bundle.noise("linear"), bundle.nuisance)

@@ -96,6 +96,9 @@ class Actuator(Settings):
     sensors: Sensors
     motion: Motion
     effects: dict[str, dict[str, float]] = Field(default_factory=dict, description="terms beyond the nominal model")
+    intervals: dict[str, dict[str, tuple[float, float]]] = Field(
+        default_factory=dict, exclude=True, description="of 95 %, of the effects' parameters, where they were measured"
+    )
 
     @property
     def n_samples(self) -> int:

@@ -49,6 +49,9 @@ class Axis(Settings):
         "s", "length of the parts of a record that are simulated on their own; chosen if not given", None, gt=0, le=1e3
     )
     effects: dict[str, dict[str, float]] = Field(default_factory=dict, description="terms beyond the nominal model")
+    intervals: dict[str, dict[str, tuple[float, float]]] = Field(
+        default_factory=dict, exclude=True, description="of 95 %, of the effects' parameters, where they were measured"
+    )
     structure: tuple[dict[str, float], ...] = Field(
         default=(), description="terms without a name, as `ema discrepancy` found them"
     )

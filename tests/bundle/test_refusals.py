@@ -42,6 +42,7 @@ def test_a_sound_bundle_loads_as_it_was_saved(small_bundle):
         (lambda p: edited(p, version=99), "version 99"),
         (lambda p: edited(p, order_of_k=["k2", "k1", "k3", "k4", "k5", "k6"]), "order of k"),
         (lambda p: edited(p, arrays={}), "lists no array"),
+        (lambda p: edited(p, nuisance=[{"parameter": "magnet_flux.change"}]), "entry 'nuisance' is damaged"),
         (lambda p: edited(p, plant={}), "manifest.json"),
         (lambda p: (p / "A.npy").write_bytes((p / "A.npy").read_bytes()[:-8]), "A.npy: is damaged"),
         (lambda p: (p / "A.npy").unlink(), "A.npy: cannot be read"),

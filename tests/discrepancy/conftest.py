@@ -20,12 +20,6 @@ def _support(name: str) -> ModuleType:
 
 
 @pytest.fixture(scope="session")
-def hidden() -> ModuleType:
-    """The independent actuator with flaws to hide (tests/support/hidden_actuator.py)."""
-    return _support("hidden_actuator")
-
-
-@pytest.fixture(scope="session")
 def axis_bench() -> ModuleType:
     """The independent motor bench (tests/support/axis_bench.py)."""
     return _support("axis_bench")

@@ -53,6 +53,8 @@ def test_magnet_flux_is_named_from_a_file_and_extends_the_plant(hidden, tmp_path
     assert max(findings["gain"]["k_after"][1:]) < 0.02
     extended = config.load(out / "extended.yaml", Actuator)
     assert extended.effects["magnet_flux"]["change"] == pytest.approx(-0.06, abs=0.004)
+    low, high = extended.intervals["magnet_flux"]["change"]
+    assert low < extended.effects["magnet_flux"]["change"] < high
     assert yaml.safe_load((out / "extended.yaml").read_text())["kind"] == "ema"
     report = (out / "report.html").read_text()
     assert "Magnet flux changed" in report

@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ema.identification.known_error import N_TERMS, KnownError, monomials
+from ema.identification.known_error import KnownError, monomials, n_terms
 
 
 def test_monomials_are_all_of_degree_one_to_four():
     k = np.random.default_rng(1).random((5, 6))
     m = monomials(k)
-    assert m.shape == (5, N_TERMS) == (5, 209)
+    assert m.shape == (5, n_terms(6)) == (5, 209)
     assert np.allclose(m[:, :6], k)
     assert np.allclose(m.sum(axis=1) + 1.0, [_complete(x) for x in k])
 
@@ -23,7 +23,7 @@ def _complete(x: np.ndarray) -> float:
 
 def quartic(n: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     k = rng.random((n, 6)) * 0.3
-    return k, monomials(k) @ np.random.default_rng(7).standard_normal((N_TERMS, 4))
+    return k, monomials(k) @ np.random.default_rng(7).standard_normal((n_terms(6), 4))
 
 
 def test_a_quartic_error_is_learned():
@@ -36,6 +36,6 @@ def test_a_quartic_error_is_learned():
 def test_from_few_noisy_runs_nothing_is_made_up():
     """As many runs as monomials and only noise: what is learned is less than the noise."""
     rng = np.random.default_rng(3)
-    k = rng.random((N_TERMS, 6)) * 0.3
+    k = rng.random((n_terms(6), 6)) * 0.3
     fitted = KnownError.fitted(k, rng.standard_normal((len(k), 4)), knee=0.15)
     assert np.sqrt(np.mean(fitted(rng.random((200, 6)) * 0.3) ** 2)) < 0.5
