@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from .fitting import fit
+from .fitting import Fit, fit, jacobian
 from .outcome import Gain, Outcome, RecordGain
 from .plant import Candidate, Errors, Plant, Point
 from .selection import (
+    FORM,
     Progress,
     Tried,
     above_noise,
     alike,
     base_model,
     best_of,
+    choice,
     compare,
     fit_model,
     is_worth_it,
@@ -30,18 +31,18 @@ from .verdict import Verdict, judge
 
 MAX_EFFECTS = 3
 MAX_TERMS = 3
+MIMICKED = 0.02  # of an effect's mark in power, where less is left of it beside the base parameters it cannot be seen
 EXPLAINED = 1.2  # held-out residual over noise up to which a model counts as explaining the data
-LITTLE_LEFT = 0.03  # or share of the residual above noise that may be left
-MIN_EXPLAINED_SHARE = 0.5  # of the residual above noise: a cause that explains less is not trusted
 
 
 @dataclass
 class _State:
-    """Model so far, and for each accepted effect the trials of its round and the model before it."""
+    """Model so far, and for each accepted effect the trials in its place and the model without it."""
 
     model: Tried
-    rounds: dict[str, tuple[dict[str, Tried], Tried]]
+    rounds: list[tuple[dict[str, Tried], Tried]]
     tried: list[dict[str, Any]]
+    n_rounds: int = 0
 
 
 def examine(plant: Plant, progress: Progress = silent) -> Outcome:
@@ -50,33 +51,34 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
     progress("nominal model")
     plain = base_model(plant)
     verdict = _judged(plant, plain)
-    state = _State(plain, {}, [])
+    state = _State(plain, [], [])
+    notes: list[str] = []
     if not verdict.is_noise:
-        _select(plant, state, plant.candidates, MAX_EFFECTS, progress)
-        if not _is_explained(plant, plain, state.model):
-            _select(plant, state, plant.structure, MAX_EFFECTS + MAX_TERMS, progress)
-        _drop_superfluous(plant, state, progress)
+        _select(plant, state, progress)
+        _revise(plant, state, progress)
     progress("final fit")
-    chosen = _union(state.model)
+    chosen = list(state.model.accepted)  # where folds suggested different parameters, those of the first fold
     free = [*plant.base, *(f for c in chosen for f in c.free)]
     final = fit(plant, free, state.model.fits[0].point, everything)
     before = fit(plant, plant.base, plain.fits[0].point, everything)
     explained = _is_explained(plant, plain, state.model)
-    named = [c for c in chosen if not c.is_structure]
     terms = [c for c in chosen if c.is_structure]
-    share = 1.0 - above_noise(state.model) / max(above_noise(plain), 1e-12)
-    notes: list[str] = []
-    trust = 1.0 if explained else min(1.0, share / MIN_EXPLAINED_SHARE)
-    if named and trust < 1.0:
-        notes.append(f"{', '.join(c.key for c in named)}: explain only {share:.0%} of the residual above noise")
-    outcome: Any = "adequate" if verdict.is_noise else ("explained" if explained and not terms else "unexplained")
+    outcome: Any = "explained" if explained and not terms else "unexplained"
+    if verdict.is_noise or (explained and not chosen):
+        outcome = "adequate"
+    if outcome == "adequate" and not verdict.is_noise:
+        notes.append(
+            f"what is left is {verdict.rms:.3g} times the noise and not white ({verdict.because}, "
+            f"p = {verdict.p_value:.1g}), but no effect and no term foretells held-out parts better: filtered, "
+            "quantised or held channels look like this"
+        )
     names = [f.name for f in plant.base]
     return Outcome(
         verdict=outcome,
         because=verdict.because,
         p_value=verdict.p_value,
-        effects=_effects(plant, state, named, final.point, final.draw, trust),
-        structure=_structure(plant, terms, final.point) if outcome == "unexplained" else {},
+        effects=_effects(plant, state, final.point, final.draw),
+        structure=plant.describe_structure(terms, final.point) if outcome == "unexplained" else {},
         train=_gain(plant, plain, state.model, held_out=False),
         heldout=_gain(plant, plain, state.model, held_out=True),
         base=names,
@@ -84,15 +86,32 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
         k_after=[float(final.point[n]) for n in names],
         records=_records(plant, plain, state.model),
         tried=state.tried,
+        mimicked=_mimicked(plant, final) if not chosen else (),
+        k_error=tuple(np.sqrt(np.diag(final.covariance))[: len(names)].tolist()),
         point=final.point,
         notes=notes,
     )
 
 
+def _mimicked(plant: Plant, model: Fit) -> tuple[str, ...]:
+    """Effects whose mark on the residual the base parameters could have made: the records cannot show them."""
+    here = np.concatenate([r.ravel() for r in model.residuals])
+    slopes, _ = np.linalg.qr(jacobian(plant, plant.base, model.point, model.blocks, here))
+    out = []
+    for candidate in plant.candidates(model.point, model.blocks):
+        points = [{**model.point, **start} for start in candidate.starts[:1]]
+        mark = np.concatenate([r.ravel() for r in plant.residuals(points, model.blocks)[0]]) - here
+        left = mark - slopes @ (slopes.T @ mark)
+        if left @ left < MIMICKED * (mark @ mark):
+            out.append(candidate.key)
+    return tuple(out)
+
+
 def _is_explained(plant: Plant, plain: Tried, model: Tried) -> bool:
+    """Noise is left, or little more, or what the wrong form of the laws found may leave."""
     if model.rms <= EXPLAINED:
         return True
-    if above_noise(model) < LITTLE_LEFT * above_noise(plain):
+    if above_noise(model) < FORM**2 * above_noise(plain):
         return True
     return _judged(plant, model).is_noise
 
@@ -102,46 +121,78 @@ def _judged(plant: Plant, model: Tried) -> Verdict:
     return judge(model.held_out, noise_uncertainty=plant.noise_uncertainty, n_free=n_free)
 
 
-def _select(plant: Plant, state: _State, suggest: Any, limit: int, progress: Progress) -> None:
-    """Forward selection until the residual is noise, nothing helps, or `limit` kinds are in the model."""
+def _select(plant: Plant, state: _State, progress: Progress) -> None:
+    """Forward selection until the residual is noise, nothing helps, or enough kinds are in the model."""
     while not _judged(plant, state.model).is_noise:
-        kinds = {c.effect for c in state.model.accepted}
-        trials = one_more(plant, state.model, suggest, partial(_round, progress, len(state.rounds) + 1))
-        if not trials:
+        trials = _round(plant, state, state.model, progress)
+        best = choice(trials, state.model) if trials else None
+        if best is None or not is_worth_it(trials[best], state.model):
             return
-        scale = min(t.scale for t in trials.values())
-        for key, trial in trials.items():
-            gain = compare(trial, state.model, scale)
-            entry = {"name": key, "round": len(state.rounds) + 1, "score": gain.gain, "error": gain.error}
-            state.tried.append({**entry, "rms": trial.rms})
-        best = best_of(trials, state.model)
         candidate = trials[best].accepted[-1]
-        if candidate.effect not in kinds and len(kinds) >= limit:
+        kinds = {c.effect for c in state.model.accepted if c.is_structure == candidate.is_structure}
+        if candidate.effect not in kinds and len(kinds) >= (MAX_TERMS if candidate.is_structure else MAX_EFFECTS):
             return
-        if not is_worth_it(trials[best], state.model):
-            return
-        state.rounds[f"{best}/{len(state.rounds)}"] = (trials, state.model)
+        state.rounds.append((trials, state.model))
         state.model = trials[best]
 
 
-def _drop_superfluous(plant: Plant, state: _State, progress: Progress) -> None:
-    """Take out what later additions have made superfluous."""
+def _round(plant: Plant, state: _State, model: Tried, progress: Progress) -> dict[str, Tried]:
+    """Everything that could be added to a model: effects of the library, and nameless terms beside them."""
+    state.n_rounds += 1
+    number = state.n_rounds
+
+    def suggest(point: Point, blocks: Sequence[int]) -> Sequence[Candidate]:
+        return [*plant.candidates(point, blocks), *plant.structure(point, blocks)]
+
+    trials = one_more(plant, model, suggest, lambda key: progress(f"round {number}: {key}"))
+    scale = min((t.scale for t in trials.values()), default=1.0)
+    for key, trial in trials.items():
+        gain = compare(trial, model, scale)
+        state.tried.append({"name": key, "round": number, "score": gain.gain, "error": gain.error, "rms": trial.rms})
+    return trials
+
+
+def _revise(plant: Plant, state: _State, progress: Progress) -> None:
+    """Look again at each effect beside the later ones: drop what they made superfluous, replace what they unmasked."""
     k = 0
     while len(state.model.accepted) > 1 and k < len(state.model.accepted):
-        progress(f"without {state.model.accepted[k].key}")
-        models = [m[:k] + m[k + 1 :] for m in state.model.models]
-        base = {f.name for f in plant.base}
-        starts = [[_without(f.point, m[k], base)] for f, m in zip(state.model.fits, state.model.models, strict=True)]
-        reduced = fit_model(plant, models, starts)
-        if is_worth_it(state.model, reduced):
-            k += 1
-        else:
+        own = state.model.accepted[k]
+        progress(f"without {own.key}")
+        reduced = _leave_out(plant, state.model, {k})
+        if not is_worth_it(state.model, reduced):
             state.model = reduced
-            del state.rounds[list(state.rounds)[k]]
+            del state.rounds[k]
+            continue
+        last = k == len(state.model.accepted) - 1
+        if own.is_structure or last:
+            state.rounds[k] = (state.rounds[k][0], reduced)
+            k += 1
+            continue
+        trials = _round(plant, state, reduced, progress)
+        trials[own.key] = state.model
+        best = choice(trials, reduced) or own.key
+        if best != own.key and compare(trials[best], state.model).is_clear:
+            model = trials[best]
+            del state.rounds[k]
+            state.rounds.append((trials, reduced))
+            state.model = model  # the new one stands last
+            k += 1
+            continue
+        state.rounds[k] = (trials, reduced)
+        k += 1
 
 
-def _round(progress: Progress, number: int, key: str) -> None:
-    progress(f"round {number}: {key}")
+def _leave_out(plant: Plant, model: Tried, out: set[int]) -> Tried:
+    """The model without some of its candidates, fitted again."""
+    models = [tuple(c for j, c in enumerate(m) if j not in out) for m in model.models]
+    base = {f.name for f in plant.base}
+    starts = []
+    for fitted, m in zip(model.fits, model.models, strict=True):
+        point = fitted.point
+        for j in out:
+            point = _without(point, m[j], base)
+        starts.append([point])
+    return fit_model(plant, models, starts)
 
 
 def _without(point: Point, candidate: Candidate, base: set[str]) -> Point:
@@ -150,32 +201,52 @@ def _without(point: Point, candidate: Candidate, base: set[str]) -> Point:
     return {name: value for name, value in point.items() if name in base or name not in own}
 
 
-def _union(model: Tried) -> list[Candidate]:
-    """Candidates of the model; where folds suggested different parameters, those of the first fold."""
-    return list(model.accepted)
-
-
-def _effects(
-    plant: Plant, state: _State, named: Sequence[Candidate], point: Any, draw: Any, trust: float
-) -> list[dict[str, Any]]:
-    described = plant.describe(named, point, draw)
+def _effects(plant: Plant, state: _State, point: Any, draw: Any) -> list[dict[str, Any]]:
+    accepted = state.model.accepted
+    named = [c for c in accepted if not c.is_structure]
+    if not named:
+        return []
+    trust = _trust(plant, state)
+    rounds = dict(zip((c.key for c in accepted), state.rounds, strict=True))
     out = []
-    rounds = {name.split("/")[0]: value for name, value in reversed(state.rounds.items())}
-    for entry in described:
+    for entry in plant.describe(named, point, draw):
         key = entry.pop("key")
         trials, before = rounds[key]
-        others = alike(trials, key, before)
-        weights = _weights(trials, before)
-        confidence = weights[key] * trust
+        others = {o for o in alike(trials, key, before) if not trials[o].accepted[-1].is_structure}
+        others |= set(entry.pop("also", ()))
+        confidence = _weights(trials, before)[key] * trust[key] / (1 + entry.pop("n_equal", 0))
         out.append(
             {
                 "name": entry.pop("name"),
                 "confidence": round(confidence, 4),
-                "indistinguishable_from": sorted(o for o in others if not trials[o].accepted[-1].is_structure),
+                "indistinguishable_from": sorted(others),
                 **entry,
             }
         )
     return out
+
+
+def _trust(plant: Plant, state: _State) -> dict[str, float]:
+    """How far each effect stands out of what is unknown.
+
+    The mark of an effect is what the mean square of the held-out residual loses by it. Beside it stand what is left
+    unexplained, what only nameless terms explain, and what the other effects' laws may miss by having the wrong form:
+    any of them may be what the effect is mistaken for.
+    """
+    accepted = state.model.accepted
+    terms = {k for k, c in enumerate(accepted) if c.is_structure}
+    nameless = _leave_out(plant, state.model, terms) if terms else state.model
+    unknown = 0.0 if _judged(plant, nameless).is_noise else above_noise(nameless)
+    marks = {
+        c.key: max(above_noise(before) - above_noise(state.model), 0.0)
+        for c, (_, before) in zip(accepted, state.rounds, strict=True)
+        if not c.is_structure
+    }
+    trust = {}
+    for key, mark in marks.items():
+        others = sum(marks.values()) - mark
+        trust[key] = mark / (mark + unknown + FORM**2 * others) if mark > 0.0 else 0.0
+    return trust
 
 
 def _weights(trials: dict[str, Tried], before: Tried) -> dict[str, float]:
@@ -188,10 +259,6 @@ def _weights(trials: dict[str, Tried], before: Tried) -> dict[str, float]:
         logs[key] = -lead.gain / max(1.0, lead.error / 5.0)
     total = sum(np.exp(v) for v in logs.values())
     return {key: float(np.exp(v) / total) for key, v in logs.items()}
-
-
-def _structure(plant: Plant, terms: Sequence[Candidate], point: Any) -> dict[str, Any]:
-    return plant.describe_structure(terms, point)
 
 
 def _gain(plant: Plant, plain: Tried, model: Tried, *, held_out: bool) -> Gain:

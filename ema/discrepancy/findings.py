@@ -105,15 +105,24 @@ class Findings:
         """What an engineer would say."""
         if self.verdict == "adequate":
             return ["The simulation agrees with the measurement: what is left is noise."]
-        said = [
-            effect.sentence[0].upper() + effect.sentence[1:]
-            + (f" (or {' or '.join(effect.indistinguishable_from)}; told apart by {effect.separated_by})"
-               if effect.indistinguishable_from else "") + "."
-            for effect in self.effects
-        ]  # fmt: skip
+        said = [_said(effect) for effect in self.effects]
         if self.verdict == "unexplained":
             said.append("No effect of the library explains the rest; its structure: " + describe(self.structure) + ".")
         return said
+
+
+SURE = 0.9
+
+
+def _said(effect: FoundEffect) -> str:
+    """The effect's sentence with its reservations."""
+    text = effect.sentence[0].upper() + effect.sentence[1:]
+    if effect.indistinguishable_from:
+        text += f" (or {' or '.join(effect.indistinguishable_from)}; told apart by {effect.separated_by})"
+    elif effect.confidence < SURE:
+        text = f"Perhaps, with a confidence of {effect.confidence:.0%} only: {effect.sentence}"
+        text += f" (to be confirmed by {effect.separated_by})"
+    return text + "."
 
 
 def describe(structure: dict[str, Any]) -> str:

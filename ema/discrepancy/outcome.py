@@ -44,6 +44,10 @@ class Outcome:
         Name, sentence, confidence, what it cannot be told from, the experiment that would tell, parameters.
     structure : dict
         Terms without a name: orders, frequencies, dependence.
+    mimicked : tuple of str
+        Effects that, if they were there, would be taken for a change of the base parameters on these records.
+    k_error : tuple of float
+        Standard deviations of `k_after`.
     point : Point
         All fitted values of the final model.
     """
@@ -60,5 +64,7 @@ class Outcome:
     k_after: list[float]
     records: list[RecordGain]
     tried: list[dict[str, Any]]
+    mimicked: tuple[str, ...] = ()
+    k_error: tuple[float, ...] = ()
     point: Point = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,13 +12,16 @@ from .plant import Array, Block, Candidate, Plant, Point
 
 N_FOLDS = 2
 FEW = 4  # parameters up to which all of them are differenced in every iteration
-N_LEADING = 3  # candidates fitted with all parameters where slopes were frozen
+QUICK = 4  # iterations after which a candidate is rated for the first time
+N_LEADING = 6  # candidates fitted to the end, with all parameters
+LEADING = 0.3  # of the best gain, from which a candidate may still win
 MIN_PARTS = 40  # parts over which gains are compared in pairs
 ODDS = 5.0  # difference in log-likelihood (150 : 1) from which one explanation is preferred
 NEARLY_NOISE = 1.1  # scale of a residual below which likelihoods can be taken at their word
 SIGNIFICANT = 2.5  # standard errors a mean gain must be above zero
 MIN_SHARE = 0.02  # of the residual above noise that a further effect must explain
 MIN_SHARE_OF_TERM = 0.05
+FORM = 0.17  # what the laws of the library are off by, relative: a Lorentzian for an exponential Stribeck curve, say
 SAME_SHARE = 0.03  # explanations of a residual that none explains fully are alike within this share of the gain
 
 
@@ -66,12 +69,12 @@ class Comparison:
     @property
     def is_significant(self) -> bool:
         """Better by more than chance. Where something is left unexplained, likelihoods alone promise too much."""
-        return self.gain > ODDS and (self.scale < NEARLY_NOISE or self.gain > SIGNIFICANT * self.error)
+        return self.gain > max(ODDS, SIGNIFICANT * self.error)
 
     @property
     def is_clear(self) -> bool:
         """The other one is ruled out."""
-        return self.gain > ODDS and (self.scale < NEARLY_NOISE or self.gain > 2.0 * self.error)
+        return self.gain > max(ODDS, 2.0 * self.error)
 
 
 def compare(one: Tried, other: Tried, scale: float | None = None) -> Comparison:
@@ -84,17 +87,6 @@ def compare(one: Tried, other: Tried, scale: float | None = None) -> Comparison:
     d = np.array(gains)
     error = float(np.std(d, ddof=1) * np.sqrt(len(d))) if len(d) > 1 else np.inf
     return Comparison(float(d.sum()), error, scale)
-
-
-@dataclass
-class Search:
-    """State of a search: `rounds` keeps for each accepted effect what else was tried in its place."""
-
-    plant: Plant
-    model: Tried
-    without: Tried
-    rounds: list[dict[str, Tried]] = field(default_factory=list)
-    tried: list[dict[str, object]] = field(default_factory=list)
 
 
 Progress = Callable[[str], None]
@@ -115,13 +107,14 @@ def fit_model(
     models: Sequence[Sequence[Candidate]],
     starts: Sequence[Sequence[Point]],
     frozen: Sequence[Array | None] = (None,) * N_FOLDS,
+    max_iterations: int = 12,
 ) -> Tried:
     """Fit one model (its candidates by fold) on all but one fold each; `starts` and `frozen` slopes by fold."""
     fits: list[Fit] = []
     held: dict[int, Array] = {}
     for (blocks, left_out), model, start, known in zip(training(plant), models, starts, frozen, strict=True):
         free = [*plant.base, *(f for c in model for f in c.free)]
-        fitted = best_fit(plant, free, start, blocks, frozen=known)
+        fitted = best_fit(plant, free, start, blocks, frozen=known, max_iterations=max_iterations)
         fits.append(fitted)
         held.update(zip(left_out, plant.residuals([fitted.point], left_out)[0], strict=True))
     ordered = tuple(held[j] for j in range(len(plant.blocks)))
@@ -154,11 +147,10 @@ def one_more(
             [{**fitted.point, **start} for start in s[key].starts]
             for fitted, s in zip(model.fits, suggested, strict=True)
         ]
-        out[key] = fit_model(plant, models, starts, frozen)
-    if any(known is not None for known in frozen):
-        for key in _leading(out, model):
-            progress(f"{key}, all parameters")
-            out[key] = refitted(plant, out[key])
+        out[key] = fit_model(plant, models, starts, frozen, QUICK)
+    for key in _leading(out, model):
+        progress(f"{key}, to the end")
+        out[key] = refitted(plant, out[key])
     return out
 
 
@@ -169,7 +161,7 @@ def _leading(trials: dict[str, Tried], model: Tried) -> list[str]:
     scale = min(t.scale for t in trials.values())
     gains = {key: compare(trial, model, scale).gain for key, trial in trials.items()}
     ranked = sorted(gains, key=lambda key: -gains[key])[:N_LEADING]
-    return [key for key in ranked if gains[key] > 0.5 * gains[ranked[0]]]
+    return [key for key in ranked if gains[key] > LEADING * gains[ranked[0]]]
 
 
 def refitted(plant: Plant, tried: Tried) -> Tried:
@@ -181,6 +173,21 @@ def best_of(trials: dict[str, Tried], model: Tried) -> str:
     """Key of the candidate under which held-out data are most likely."""
     scale = min(t.scale for t in trials.values())
     return max(trials, key=lambda key: compare(trials[key], model, scale).gain)
+
+
+def choice(trials: dict[str, Tried], model: Tried) -> str | None:
+    """Key of what to add: the best of the library, unless a nameless term foretells held-out data clearly better."""
+    named = {key: t for key, t in trials.items() if not t.accepted[-1].is_structure}
+    nameless = {key: t for key, t in trials.items() if t.accepted[-1].is_structure}
+    if not named or not nameless:
+        return best_of(trials, model) if trials else None
+    one, other = best_of(named, model), best_of(nameless, model)
+    lead = compare(trials[other], trials[one])
+    if lead.is_clear and lead.gain > SAME_SHARE * compare(trials[other], model).gain:
+        return other
+    if is_worth_it(trials[one], model) or not is_worth_it(trials[other], model):
+        return one
+    return other
 
 
 def alike(trials: dict[str, Tried], best: str, model: Tried) -> list[str]:

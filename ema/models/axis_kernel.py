@@ -81,6 +81,13 @@ def delayed(t, x, k, delay, slope):
     return x[j] + (x[j + 1] - x[j]) * (at - t[j]) / (t[j + 1] - t[j])
 
 
+@njit(inline="always")
+def current_after(i, e, R, L, h):
+    """Current a time `h` later under a constant voltage, exactly.    L di/dt = e - R i   [A]"""
+    x = h * R / L
+    return e / R + (i - e / R) * math.exp(-x) if x > 1e-6 else i + h / L * e
+
+
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
 def simulate_window(z, lines, terms, mode, t, drive, theta, w, h_max, out):
     """Simulate one window from position `theta` and speed `w`.
@@ -107,7 +114,7 @@ def simulate_window(z, lines, terms, mode, t, drive, theta, w, h_max, out):
     R_now = z[R] * resistance_factor(z, 0, 1, z[DT])
     skew = 1.0 + z[SKEW]
     d_w = z[SPEED_DELAY]
-    i, slope = 0.0, 0.0
+    i, i_end, slope, dw = 0.0, 0.0, 0.0, 0.0
     if mode == VOLTAGE:
         u = (drive[0] - z[OFFSET]) * gain
         i = (u - z[K_E] * emf_factor(z, 0, 1, 0.0, z[DT]) * w) / max(R_now, 1e-9)
@@ -135,9 +142,9 @@ def simulate_window(z, lines, terms, mode, t, drive, theta, w, h_max, out):
                 if mode == VOLTAGE:
                     k_e = z[K_E] * emf_factor(z, 0, 1, i, z[DT])
                     L_now = max(z[L] * inductance_factor(z, 0, 1, i), 1e-12)
-                    e = u - k_e * w - z[DROP] * min(max(i / 1e-2, -1.0), 1.0)
-                    # implicit in R i: stable also where L / R is shorter than the step
-                    i = (i + h / L_now * e) / (1.0 + h / L_now * R_now)
+                    e = u - k_e * (w + 0.5 * dw) - z[DROP] * min(max(i / 1e-2, -1.0), 1.0)
+                    i_next = current_after(i, e, R_now, L_now, h)
+                    i, i_end = 0.5 * (i + i_next), i_next
                 else:
                     i = u
             tau_m = i if mode == FORCE else z[K_T] * emf_factor(z, 0, 1, i, z[DT]) * i
@@ -147,7 +154,10 @@ def simulate_window(z, lines, terms, mode, t, drive, theta, w, h_max, out):
             F_s, F_d = friction(z, terms, theta_mid, w, tau, tau_m, i, t_mid)
             w_next = speed_after(w, tau, F_s, F_d, h / inertia)
             theta += 0.5 * h * (w + w_next)
+            dw = w_next - w
             w = w_next
+            if mode == VOLTAGE:
+                i = i_end
         if k == 0:
             slope = (w - out[1, 0]) / span
     _sensors(z, t, skew, slope, out, R_now, mode, drive, gain)

@@ -29,3 +29,9 @@ def axis_bench() -> ModuleType:
 def hidden_axis(axis_bench: ModuleType) -> ModuleType:
     """What can be hidden in that bench (tests/support/hidden_axis.py)."""
     return _support("hidden_axis")
+
+
+@pytest.fixture(scope="session")
+def axis_other() -> ModuleType:
+    """Further axes of other code still (tests/support/axis_other.py)."""
+    return _support("axis_other")

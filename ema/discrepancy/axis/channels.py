@@ -24,6 +24,7 @@ class Roles:
     position: str | None
     speed: str | None
     outputs: tuple[str, ...]
+    derived: str | None = None  # a speed that repeats the position
 
 
 def roles(plant: Axis, record: Record) -> Roles:

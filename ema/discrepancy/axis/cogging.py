@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MAX_ORDER = 240
 MAX_LINES = 8
 MIN_LINE = 0.03  # of the strongest line: weaker ones are not worth a name
-MAX_ROWS = 5000
+MAX_ROWS = 2500
 N_GROWTHS = 3.0  # growth of e^3 in a window
 LONGEST_WINDOW = 0.4  # [s]
 ALARM = 1e-4  # of a line that is not there, over all orders
@@ -46,13 +46,9 @@ def scan(weak: Weak, orders: Array, max_lines: int = MAX_LINES, alarm: float = A
     m = weak.motion
     always = [np.ones(len(m.theta)), np.sign(m.direction), m.w]
     A = np.stack([*(weak.integrate(f) / weak.sigma for f in always), weak.inertia / weak.sigma], axis=1)
-    lines = np.stack(
-        [
-            np.stack([weak.integrate(np.cos(n * m.theta)), weak.integrate(np.sin(n * m.theta))], axis=1)
-            / weak.sigma[:, None]
-            for n in orders
-        ]
-    )  # (n_orders, n_y, 2)
+    angles = m.theta[:, None] * orders
+    parts = [weak.integrate(f(angles)) / weak.sigma[:, None] for f in (np.cos, np.sin)]
+    lines = np.stack(parts, axis=2).transpose(1, 0, 2)  # (n_orders, n_y, 2)
     resolvable = np.sqrt((lines**2).mean(axis=(1, 2))) > 0.1 * np.sqrt(np.mean(weak.sigma**-2.0) * 0.5)
     chosen: list[int] = []
     basis = _orthonormal(A)
@@ -74,8 +70,8 @@ def scan(weak: Weak, orders: Array, max_lines: int = MAX_LINES, alarm: float = A
     if not chosen:
         return Scan((), np.empty((0, 2)))
     coefficients, *_ = np.linalg.lstsq(np.concatenate([A, *lines[chosen]], axis=1), y, rcond=None)
-    parts = coefficients[A.shape[1] :].reshape(-1, 2)
-    return Scan(tuple(float(orders[k]) for k in chosen), parts, float(-coefficients[A.shape[1] - 1]))
+    found = coefficients[A.shape[1] :].reshape(-1, 2)
+    return Scan(tuple(float(orders[k]) for k in chosen), found, float(-coefficients[A.shape[1] - 1]))
 
 
 def thinned(weak: Weak) -> Weak:

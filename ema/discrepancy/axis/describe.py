@@ -45,17 +45,42 @@ def effects(plant: AxisPlant, found: Sequence[Candidate], point: Point, drawn: S
                 low, high = np.percentile(spread, INTERVAL) if spread.size else (value, value)
                 parameters[name] = {"value": value, "low": float(low), "high": float(high), "unit": unit[name]}
             full = {**effect.neutral(), **values}
-            out.append(
-                {
-                    "key": candidate.key,
-                    "name": effect.name,
-                    "sentence": effect.sentence.format(**full),
-                    "separated_by": effect.separated_by,
-                    "mistaken_for": list(effect.mistaken_for),
-                    "parameters": parameters,
-                }
-            )
+            entry = {
+                "key": candidate.key,
+                "name": effect.name,
+                "sentence": effect.sentence.format(**full),
+                "separated_by": effect.separated_by,
+                "mistaken_for": list(effect.mistaken_for),
+                "parameters": parameters,
+            }
+            out.append(entry | (_electrical(plant, values) if effect.name == "cogging" else {}))
     return out
+
+
+def _electrical(plant: AxisPlant, values: dict[str, float]) -> dict[str, Any]:
+    """What else makes a line of this order where it is a whole number of periods per electrical turn.
+
+    With the current given as i_q, an offset of a phase's sensor is a torque at the electrical frequency, and unequal
+    sensor gains are one at twice that, proportional to the current.
+    """
+    p = getattr(plant.plant, "p", None)
+    if p is None or plant.plant.drive == "force":
+        return {}
+    other = {p: "current_offset", 2 * p: "current_gain"}.get(round(values["order"]))
+    if other is None:
+        return {}
+    slots = getattr(plant.plant, "slots", None)
+    odd = slots is not None and values["order"] % slots and values["order"] % (2 * p)
+    say = f"; a sound motor cogs at multiples of {slots} slots or {2 * p} poles only" if odd else ""
+    what = {"current_offset": "an offset of a phase's current sensor", "current_gain": "unequal phase current sensors"}
+    periods = {"current_offset": "once", "current_gain": "twice"}[other]
+    return {
+        "also": [other],
+        "n_equal": 1,
+        "sentence": f"torque of {values['amplitude']:.3g} N m with {values['order']:.4g} periods per rotor turn, "
+        f"{periods} per electrical turn: cogging or {what[other]}{say}",
+        "separated_by": "the three phase currents, with the inverter off and under load",
+    }
 
 
 def _key(effects_: dict[str, dict[str, float]], values: dict[str, float]) -> str:

@@ -12,6 +12,10 @@ from scipy.optimize import nnls
 from ema.core.records import Array, Cycle
 
 N_BINS = 8
+MAX_SAMPLES = 4000  # of a cycle, to see how a channel was made
+MIN_STEPS = 20  # steps of few counts from which a lattice can be told
+SIMULATED_TO = 3e-4  # of a channel's size: what is lost between samples of the drive
+DERIVED = 0.02  # of its noise: what may be left of a speed that is computed from the position
 ESTIMATE_UNCERTAINTY = 0.1  # relative, of an estimated amplitude
 
 
@@ -65,19 +69,27 @@ def disagreement(t: Array, x: Array) -> tuple[Array, Array, NDArray[np.int_]]:
 
 
 def quantum(x: Array) -> float:
-    """Step of a quantised channel, 0 if there is none."""
-    values = np.unique(x)
-    if len(values) < 2 or len(values) > len(x) / 3:
+    """Step of a quantised channel, 0 where its values lie on no lattice (or it is too fast for that to matter)."""
+    d = np.abs(np.diff(x))
+    d = d[d > 0.0]
+    if len(d) < 2 * MIN_STEPS:
         return 0.0
-    return float(np.percentile(np.diff(values), 10))
+    step = float(np.mean(d[d < 1.5 * d.min()]))
+    n = d[d < 20.0 * step] / step
+    if len(n) < MIN_STEPS or np.mean(np.abs(n - np.round(n)) < 0.1) < 0.95:
+        return 0.0
+    return step
 
 
-def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None) -> Noise:
-    """Estimate from a channel's cycles: robust, and rather too large than too small (fast motion counts as noise)."""
-    parts = [disagreement(cycle["t"], cycle[name]) for cycle in cycles if cycle.n_samples > 8]
+def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None, least: float = 0.0) -> Noise:
+    """Estimate from a channel's cycles: robust, rather too large than too small (fast motion counts as noise).
+
+    `least` is what no simulation is expected to be better than.
+    """
     everything = np.concatenate([cycle[name] for cycle in cycles])
-    step = resolution or quantum(everything)
-    floor = max(step / np.sqrt(12.0), 1e-9 * float(np.std(everything)), 1e-12)
+    step = resolution or max(quantum(cycle[name]) for cycle in cycles)
+    floor = max(step / np.sqrt(12.0), least, 1e-9 * float(np.std(everything)), 1e-12)
+    parts = [disagreement(cycle["t"], cycle[name]) for cycle in cycles if cycle.n_samples > 8]
     if not parts:
         return Noise(floor)
     r = np.concatenate([p[0] for p in parts])
@@ -95,6 +107,27 @@ def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None) -> 
     v, s, w = np.array(variance), np.array(square), np.array(weight)
     (a, b), _ = nnls(np.stack([w, w * s], axis=1), w * v)
     return Noise(max(float(np.sqrt(a)), floor), float(np.sqrt(b)))
+
+
+def is_derived(cycle: Cycle, position: str, speed: str) -> bool:
+    """Whether the speed is computed from neighbouring samples of the position (differences, with or without a filter).
+
+    Such a channel repeats the position's noise and says nothing that the position does not.
+    """
+    reach = 8
+    w, d = cycle[speed][:MAX_SAMPLES], np.diff(cycle[position][: MAX_SAMPLES + 1])
+    n = min(len(w), len(d))
+    if n < 20 * reach:
+        return False
+    noise = np.sqrt(_robust_variance(disagreement(cycle["t"][:n], w[:n])[0]))
+    if noise < SIMULATED_TO * np.sqrt(np.mean(w**2)):
+        return False
+    inside = np.arange(reach, n - reach)
+    columns = [d[inside + k] for k in range(-reach, reach + 1)]
+    A = np.stack([*columns, w[inside - 1], np.ones(len(inside))], axis=1)
+    A = A / np.maximum(np.linalg.norm(A, axis=0), 1e-300)
+    c, *_ = np.linalg.lstsq(A, w[inside], rcond=1e-12)
+    return bool(np.sqrt(np.mean((w[inside] - A @ c) ** 2)) < DERIVED * noise)
 
 
 def _robust_variance(r: Array) -> float:

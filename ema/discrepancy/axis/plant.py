@@ -21,12 +21,11 @@ from .cogging import LONGEST_WINDOW, predictable
 from .naming import Numbers, numbers_of
 from .noise import ESTIMATE_UNCERTAINTY
 from .whitening import Filter, design, joined, open_loop_variance
-from .windows import HALF, Bench, Window, bench
+from .windows import START_NOISE, Bench, Window, bench, speed_noise
 
 TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
 RUNAWAY = 1e6  # a window that runs away counts as no worse than this
 H_MAX = 2.5e-4  # [s] longest step of the simulation, unless the record's own period is longer than ten of them
-START_NOISE = 1.5 / np.sqrt(2 * HALF + 1)  # of a smoothed start state, per noise of one sample
 
 
 class AxisPlant:
@@ -170,10 +169,13 @@ class AxisPlant:
         """The record a block belongs to."""
         return self._bench_of[block]
 
+    @cached_property
+    def _pool(self) -> ThreadPoolExecutor:
+        return ThreadPoolExecutor(self.n_threads)
+
     def _map(self, f: Callable[[Point], list[Array]], points: Sequence[Point]) -> list[list[Array]]:
         if self.n_threads > 1 and len(points) > 1:
-            with ThreadPoolExecutor(self.n_threads) as pool:
-                return list(pool.map(f, points))
+            return list(self._pool.map(f, points))
         return [f(point) for point in points]
 
     def _pack(self, blocks: tuple[int, ...]) -> list[_Pack]:
@@ -204,8 +206,8 @@ class AxisPlant:
         if pack.bench.roles.speed is None:
             late_w = late_theta
         for place, w in enumerate(pack.windows):
-            starts[place, 0] = np.interp(w.t[0] + late_theta, w.t, w.position)
-            starts[place, 1] = np.interp(w.t[0] + late_w, w.t, w.speed)
+            starts[place, 0] = w.position[0] if late_theta == 0.0 else np.interp(w.t[0] + late_theta, w.t, w.position)
+            starts[place, 1] = w.speed[0] if late_w == 0.0 else np.interp(w.t[0] + late_w, w.t, w.speed)
         return axis.true_state(model, starts)
 
     def _filter(self, b: Bench, w: Window) -> Filter:
@@ -217,7 +219,7 @@ class AxisPlant:
     ) -> tuple[Array, Array, Array, float, tuple[float, float]]:
         p, kind = self.plant, b.roles.kind
         k_t = 1.0 if kind == "force" else float(p.k_t or 1.0)
-        k_e, R, L, J = float(p.k_e or 0.0), float(p.R or 0.0), float(p.L or 0.0), p.inertia
+        k_e, R, L, J = float(p.k_e or 0.0), max(float(p.R or 0.0), 1e-9), float(p.L or 0.0), p.inertia
         acceleration = np.gradient(w.speed, w.t)
         drive_noise = b.noise[b.roles.drive].rms(np.gradient(w.drive, w.t))
         rows, noise = [], []
@@ -235,11 +237,12 @@ class AxisPlant:
                 noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
             else:
                 rows.append((0.0, -k_e / R if kind == "voltage" else -(p.loop.K_w if p.loop else 0.0)))
-                noise.append(sigma.rms(np.gradient(w.outputs[place], w.t)))
+                through = np.sqrt(w.period / (2.0 * L / R + w.period)) / R * drive_noise if kind == "voltage" else 0.0
+                noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
         gain, damping = {
             "current": (k_t, p.C / J),
             "force": (1.0, p.C / J),
-            "voltage": (k_t / max(R, 1e-9), (p.C + k_t * k_e / max(R, 1e-9)) / J),
+            "voltage": (k_t / R, (p.C + k_t * k_e / R) / J),
             "speed-loop": (k_t * (p.loop.K_w if p.loop else 0.0),) * 2,
         }[kind]
         if kind == "speed-loop":
@@ -257,9 +260,7 @@ class AxisPlant:
         return np.array(rows), np.array(noise), process, float(damping), excursion
 
     def _speed_noise(self, b: Bench, w: Window) -> float:
-        if b.roles.speed is not None:
-            return b.noise[b.roles.speed].sigma
-        return b.noise[str(b.roles.position)].sigma / (HALF * w.period)
+        return speed_noise(b.roles, b.noise, w.period)
 
     def _position_noise(self, b: Bench, w: Window) -> float:
         if b.roles.position is not None:

@@ -51,24 +51,38 @@ def search(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candid
     q, _ = np.linalg.qr(np.stack(columns, axis=1))
     rest = y - q @ (q.T @ y)
     best: dict[str, tuple[float, Term, Array]] = {}
-    for term in _dictionary(m, sizes(plant)):
-        gain, coefficients = _gain(weak, term, q, rest)
-        if gain > best.get(term.family, (0.0,))[0]:
-            best[term.family] = (gain, term, coefficients)
+    for family, terms in _families(m, sizes(plant)).items():
+        for gain, term, coefficients in _gains(weak, terms, q, rest):
+            if gain > best.get(family, (0.0,))[0]:
+                best[family] = (gain, term, coefficients)
     power = float(rest @ rest)
     ranked = sorted((b for b in best.values() if b[0] > MIN_GAIN * power), key=lambda b: -b[0])
     number = 1 + len({name.split(".")[0] for name in point if name.startswith("term")})
     return [_candidate(f"term{number}", term, c, plant) for _, term, c in ranked[:N_SUGGESTIONS]]
 
 
-def _gain(weak: Weak, term: Term, q: Array, rest: Array) -> tuple[float, Array]:
-    """Power of the residual that the term explains, and its coefficients."""
-    A = np.stack([weak.integrate(f) / weak.sigma for f in term.columns], axis=1)
-    left = A - q @ (q.T @ A)
-    if np.linalg.norm(left) < 1e-3 * np.linalg.norm(A):
-        return 0.0, np.zeros(A.shape[1])
-    coefficients, *_ = np.linalg.lstsq(left, rest, rcond=1e-6)
-    return float(rest @ (left @ coefficients)), np.asarray(coefficients)
+def _families(m: Motion, s: Sizes) -> dict[str, list[Term]]:
+    out: dict[str, list[Term]] = {}
+    for term in _dictionary(m, s):
+        out.setdefault(term.family, []).append(term)
+    return out
+
+
+def _gains(weak: Weak, terms: Sequence[Term], q: Array, rest: Array) -> Iterator[tuple[float, Term, Array]]:
+    """Power of the residual that each term of a family explains beside `q`, and its coefficients."""
+    parts = [np.stack(columns, axis=1) for columns in zip(*(t.columns for t in terms), strict=True)]
+    own = [weak.integrate(part) / weak.sigma[:, None] for part in parts]
+    left = [part - q @ (q.T @ part) for part in own]
+    left = [np.where(_norms(b) < 1e-3 * _norms(a), 0.0, b) for a, b in zip(own, left, strict=True)]
+    for k, term in enumerate(terms):
+        A = np.stack([part[:, k] for part in left], axis=1)
+        gram, b = A.T @ A, A.T @ rest
+        coefficients = np.linalg.pinv(gram, rcond=1e-9, hermitian=True) @ b
+        yield float(b @ coefficients), term, coefficients
+
+
+def _norms(columns: Array) -> Array:
+    return np.asarray(np.linalg.norm(columns, axis=0))
 
 
 def _dictionary(m: Motion, s: Sizes) -> Iterator[Term]:

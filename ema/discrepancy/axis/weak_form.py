@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ema.core.records import Array
 from ema.discrepancy.plant import Point
@@ -66,9 +68,15 @@ class Weak:
     weight: Array
     block: np.ndarray
 
+    @cached_property
+    def _matrix(self) -> csr_array:
+        rows = np.repeat(np.arange(len(self.y)), self.index.shape[1])
+        shape = (len(self.y), len(self.motion.theta))
+        return csr_array((self.weight.ravel(), (rows, self.index.ravel())), shape=shape)
+
     def integrate(self, f: Array) -> Array:
-        """∫ φ_k f dt of values at the motion's samples, shape (n_y,)."""
-        return np.asarray((self.weight * f[self.index]).sum(axis=1))
+        """∫ φ_k f dt of values at the motion's samples, shape (n_samples,) or (n_samples, n_columns)."""
+        return np.asarray(self._matrix @ f)
 
     def __getitem__(self, chosen: np.ndarray) -> Weak:
         columns = (self.y[chosen], self.sigma[chosen], self.inertia[chosen])

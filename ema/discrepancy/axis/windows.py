@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from ema.core.errors import RecordError
@@ -13,7 +14,7 @@ from ema.core.records import Array, Cycle, Record
 from ema.models.axis_config import Axis
 
 from .channels import MIN_SAMPLES, Roles, roles
-from .noise import Noise, estimate
+from .noise import SIMULATED_TO, Noise, estimate, is_derived
 
 HALF = 5  # samples on each side of a local quadratic
 GLITCH = 12.0  # noise amplitudes by which a step of position may miss the speed before the window is cut there
@@ -21,6 +22,9 @@ MAX_SAMPLES = 12_000  # of one record
 AMBIENT = 20.0  # [°C]
 STATIC_SAMPLES = 250
 MIN_WINDOW = 16  # samples
+AT_REST = 3.0  # noise amplitudes of the smoothed speed below which nothing is seen to move
+SHORTEST_REST = 3  # samples
+START_NOISE = 1.5 / np.sqrt(2 * HALF + 1)  # of a smoothed start state, per noise of one sample
 STRETCH = 0.4  # [s] windows closer together are not independent enough to check one another
 
 
@@ -73,6 +77,8 @@ def bench(plant: Axis, record: Record, name: str, length: float) -> Bench:
     if static:  # readings at rest follow each other by number, not by time
         numbered = tuple(Cycle(c.number, {**c.channels, "t": np.arange(float(c.n_samples))}, c.label) for c in record)
         record = replace(record, cycles=numbered)
+    if not static and who.position and who.speed and all(is_derived(c, who.position, who.speed) for c in record):
+        who = replace(who, speed=None, outputs=tuple(c for c in who.outputs if c != who.speed), derived=who.speed)
     noise = {c: _noise(plant, record, c) for c in ({who.drive} if static else {who.drive, *who.outputs})}
     if static and plant.drive != "current":
         raise RecordError(f"{record.name}: a record at standstill needs drive: current with i_q [A]")
@@ -93,7 +99,9 @@ def bench(plant: Axis, record: Record, name: str, length: float) -> Bench:
 def _noise(plant: Axis, record: Record, name: str) -> Noise:
     if name in plant.noise:
         return Noise(plant.noise[name], declared=True)
-    return estimate(record.cycles, name, record.resolution.get(name))
+    x = [np.gradient(c[name], c["t"]) * c.period if name in ("theta_m", "q") else c[name] for c in record]
+    least = SIMULATED_TO * float(np.sqrt(np.mean(np.square(np.concatenate(x)))))
+    return estimate(record.cycles, name, record.resolution.get(name), least)
 
 
 def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str, Noise]) -> list[Window]:
@@ -115,11 +123,15 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
     dT = float(np.mean(cycle["temp_w"])) - AMBIENT if "temp_w" in cycle else 0.0
     cuts = _glitches(cycle, who, noise) if who.position is not None and who.speed is not None else np.array([], int)
     gaps = np.flatnonzero(np.diff(t) > 5.0 * dt) + 1
-    edges = np.unique(np.concatenate(([0], cuts, gaps, [n])))
+    still = np.abs(speed) < AT_REST * START_NOISE * speed_noise(who, noise, dt)
+    rests = _rests(still | _reversals(speed))
+    edges = np.unique(np.concatenate(([0], cuts, gaps, rests.ravel(), [n]))).astype(int)
     n_window = max(MIN_WINDOW, round(length / dt))
     out = []
     first = cycle.number * 1_000_000  # stretches of different cycles are different
     for a, b in pairwise(edges.tolist()):
+        if any(start <= a < stop for start, stop in rests):
+            continue
         n_parts = max(1, round((b - a) / n_window))
         for part in np.array_split(np.arange(a, b), n_parts):
             if len(part) >= MIN_WINDOW:
@@ -129,6 +141,35 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
                 stretch = first + int((t[rows][0] - t[0]) / max(STRETCH, length))
                 columns = (t[rows], cycle[who.drive][rows], outputs, smooth[rows], speed[rows])
                 out.append(Window(group, label, *columns, dT, stretch=stretch))
+    return out
+
+
+def speed_noise(who: Roles, noise: dict[str, Noise], period: float) -> float:
+    """Noise of one sample of the speed; where it is derived, from that of the position."""
+    return noise[who.speed].sigma if who.speed is not None else noise[str(who.position)].sigma / (HALF * period)
+
+
+def _rests(still: NDArray[np.bool_]) -> NDArray[np.int_]:
+    """Begin and end of each rest, shape (n_rests, 2).
+
+    A window ends where the axis comes to rest and the next begins when it moves: when it breaks away depends on a
+    torque of which the record has noisy samples, and what follows a breakaway at another moment is no noise.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(int), [0])))).reshape(-1, 2)
+    return edges[edges[:, 1] - edges[:, 0] >= SHORTEST_REST]
+
+
+def _reversals(speed: Array) -> NDArray[np.bool_]:
+    """Samples about each reversal, where friction turns round over a way that no law here describes.
+
+    Only where the stretches between reversals are long enough to stand alone.
+    """
+    turns = np.flatnonzero(np.sign(speed[1:]) != np.sign(speed[:-1])) + 1
+    between = np.diff(np.concatenate(([0], turns, [len(speed)])))
+    out = np.zeros(len(speed), dtype=bool)
+    for place, k in enumerate(turns):
+        if min(between[place], between[place + 1]) >= 2 * MIN_WINDOW:
+            out[max(k - SHORTEST_REST, 0) : k + SHORTEST_REST] = True
     return out
 
 

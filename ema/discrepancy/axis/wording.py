@@ -7,8 +7,12 @@ from typing import Any
 
 from ema.discrepancy import findings as shared
 from ema.discrepancy.outcome import Outcome
+from ema.effects import registry
+from ema.models.axis_config import LinearAxis
 
 from .plant import AxisPlant
+
+MOVED = 0.02  # of the plant file's friction: less is not worth a word
 
 
 def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
@@ -32,7 +36,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     notes = [*outcome.notes]
     if outcome.verdict != "adequate":
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
-    notes += _kinds(plant)
+    notes += _moved(plant, outcome) + _kinds(plant)
     return shared.Findings(
         outcome.verdict,
         [_effect(e) for e in outcome.effects],
@@ -43,6 +47,20 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         [asdict(r) for r in outcome.records],
         _fitted(plant, outcome),
     )
+
+
+def _moved(plant: AxisPlant, outcome: Outcome) -> list[str]:
+    """Friction that was fitted away from the plant file's, and what it may stand for."""
+    before, after, error = plant.plant.F_d, outcome.point["F_d"], outcome.k_error[outcome.base.index("F_d")]
+    if abs(after - before) < max(3.0 * error, MOVED * before):
+        return []
+    unit = "N" if isinstance(plant.plant, LinearAxis) else "N m"
+    text = f"dry friction was fitted as {after:.3g} {unit}, the plant file says {before:.3g}"
+    if outcome.mimicked:
+        how = dict.fromkeys(registry()[name.split(":")[0]].separated_by for name in outcome.mimicked)
+        others = " or ".join(outcome.mimicked)
+        text += f"; on these records {others} would look the same, to be told apart by {'; '.join(how)}"
+    return [text]
 
 
 def _effect(e: dict[str, Any]) -> shared.FoundEffect:
@@ -60,8 +78,9 @@ def _kinds(plant: AxisPlant) -> list[str]:
             for name, n in b.noise.items()
             if not n.declared
         )
+        more = f"; {b.roles.derived} repeats {b.roles.position} and is not compared" if b.roles.derived else ""
         how = "at standstill" if b.static else f"driven by {b.roles.drive} in windows of {b.windows[0].n} samples"
-        out.append(f"{b.name}: {how}" + (f"; noise estimated: {noise}" if noise else ""))
+        out.append(f"{b.name}: {how}" + (f"; noise estimated: {noise}" if noise else "") + more)
     return out
 
 
