@@ -7,6 +7,7 @@ import numpy as np
 from ema import faults
 from ema.models.actuator import Actuator
 from ema.models.envelope import rectified, smoothed
+from ema.models.turns import nearest_turn
 
 from .measurement import Measurement
 
@@ -68,14 +69,13 @@ class Sampler:
     def _start(self, theta_u: float, theta_m: float) -> np.ndarray | None:
         """User position and rotor angle over gear ratio at t = 0.
 
-        A resolver knows the angle within one turn only; which turn, the user's position says: backlash is much less
-        than the 2π/GR that a turn moves the user. None where they are further apart than any play: two sensors that do
-        not share their zero.
+        A resolver knows the angle within one turn only; which turn, the user's position says. None where they are
+        further apart than any play: two sensors that do not share their zero.
         """
         if np.isnan(theta_u) or np.isnan(theta_m):
             return None
-        GR, turn = self._plant.transmission.GR, 2.0 * np.pi
-        theta_m += turn * np.round((theta_u * GR - theta_m) / turn)
+        GR = self._plant.transmission.GR
+        theta_m += nearest_turn(theta_u, theta_m, GR)
         if abs(theta_u - theta_m / GR) > self._widest:
             return None
         return np.array([theta_u, theta_m / GR])

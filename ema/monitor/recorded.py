@@ -20,6 +20,7 @@ from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
 from ema.log import LogReader
 from ema.models.actuator import Actuator
+from ema.models.turns import nearest_turn
 
 from .assembler import Assembler
 from .cycles import MOTION_RATIO, AssembledCycle
@@ -80,8 +81,7 @@ def _cycle(cycle: AssembledCycle, plant: Actuator, supply: dict[str, float]) -> 
     coarse = np.arange(cycle.span.n_motion_samples) * MOTION_RATIO
     theta_u = np.interp(index, coarse, cycle.motion["theta_u"])
     theta_m = np.unwrap(cycle.motion["theta_m"])
-    turn = 2.0 * np.pi  # which turn the rotor is in, the user's position says
-    theta_m += turn * np.round((cycle.motion["theta_u"][0] * plant.transmission.GR - theta_m[0]) / turn)
+    theta_m += nearest_turn(cycle.motion["theta_u"][0], theta_m[0], plant.transmission.GR)
     channels = {
         "t": t,
         **dict(zip(("i_a", "i_b", "i_c"), cycle.i, strict=True)),

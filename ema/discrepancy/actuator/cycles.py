@@ -12,6 +12,7 @@ from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record, require
 from ema.models.actuator import Actuator
 from ema.models.envelope import envelope
+from ema.models.turns import nearest_turn
 
 from .features import Array, Signals, features, motor_torque, stacked
 
@@ -85,7 +86,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
         for cycle in record.cycles:
             where = f"{record.name}: {cycle}"
             _check_rate(where, cycle, plant)
-            s = _signals(cycle, with_supply)
+            s = _signals(cycle, with_supply, plant.transmission.GR)
             _check_motion(where, s, plant)
             _check_clipping(where, s, plant)
             _check_synchrony(where, s, plant)
@@ -109,14 +110,16 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
         holding - holding.mean(axis=1, keepdims=True),
         dT,
         with_temperature,
-        _step(np.concatenate([s.theta_m[0] for s in signals])),
+        _step(np.concatenate([cycle["theta_m"] for _, cycle in everything])),
     )
 
 
-def _signals(cycle: Cycle, with_supply: bool) -> Signals:
+def _signals(cycle: Cycle, with_supply: bool, GR: float) -> Signals:
+    theta_m = np.unwrap(cycle["theta_m"])
+    theta_m += nearest_turn(cycle["theta_u"][0], theta_m[0], GR)
     return Signals(
         np.stack([cycle["i_a"], cycle["i_b"], cycle["i_c"]])[None],
-        cycle["theta_m"][None],
+        theta_m[None],
         cycle["theta_u"][None],
         cycle["theta_cmd"][None],
         cycle["u_dc"][None] if with_supply else None,

@@ -14,6 +14,7 @@ from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
 from ema.effects import registry
 from ema.models.actuator import Actuator
 
+from .conditions import as_recorded
 from .cycles import Measured
 from .fit import Fit
 from .noise import Noise, Verdict
@@ -69,6 +70,7 @@ def examine(
             f"{data.labels[0]}: is the only cycle; at least {MIN_CYCLES} are needed, to test on one what another says"
         )
     train, heldout = split(data)
+    plant, conditions = as_recorded(plant, data.signals)
     ema = EmaPlant(plant, data, n_threads)
     say("switching noise")
     search = Search(ema, Noise(ema, {}), train, heldout, say)
@@ -93,7 +95,9 @@ def examine(
             search.noise = Noise(ema, after.fit.point)
         v = search.verdict(after)
         say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
-    return Examination(_findings(search, before, after, v, alike), search, before, after, verdict_before, v)
+    findings = _findings(search, before, after, v, alike)
+    findings.notes.extend(conditions)
+    return Examination(findings, search, before, after, verdict_before, v)
 
 
 def _does_it(search: Search, model: Model, previous: Model) -> bool:

@@ -1,0 +1,85 @@
+"""Conditions are read from records of other code than the finder's; where there is nothing to tell, nothing is."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from scipy.ndimage import uniform_filter1d
+
+from ema.core.records import Cycle, Record
+from ema.discrepancy.actuator.conditions import as_recorded, current_noise, position_noise, supply_voltage
+from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.examine import examine
+
+
+@pytest.fixture(scope="module")
+def cycles(hidden):
+    """Two healthy cycles on a supply with 0.2 ohm."""
+    return hidden.cycles(hidden.Flaws(source_resistance=0.2), 2, 11)
+
+
+def prepared(plant, cycles, **changes):
+    """The record's signals, channels changed by functions of the channel."""
+    altered = [{**c, **{name: change(c[name]) for name, change in changes.items()}} for c in cycles]
+    return measured(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(altered)))])
+
+
+def test_a_record_of_the_plant_changes_nothing(cycles, shipped_plant):
+    plant, notes = as_recorded(shipped_plant, prepared(shipped_plant, cycles).signals)
+    assert plant == shipped_plant
+    assert notes == []
+
+
+@pytest.mark.parametrize("sd", [0.02, 0.05])
+def test_noise_of_the_current_sensors_is_read_from_their_sum(cycles, shipped_plant, sd):
+    rng = np.random.default_rng(1)
+    noisy = {f"i_{j}": lambda x: x + sd * rng.standard_normal(len(x)) for j in "abc"}
+    signals = prepared(shipped_plant, cycles, **noisy).signals
+    assert current_noise(shipped_plant, signals) == pytest.approx(np.hypot(sd, 5e-3), rel=0.05)
+    assert "sensors.current_noise" in as_recorded(shipped_plant, signals)[1][0]
+
+
+def test_noise_of_the_position_is_read_below_and_above_the_step_of_its_converter(hidden, shipped_plant):
+    step = shipped_plant.sensors.lvdt_step
+    rng = np.random.default_rng(2)
+
+    def converted(x, sd):
+        return step * np.round((uniform_filter1d(x, 101) + sd * rng.standard_normal(len(x))) / step)
+
+    for sd in (0.3 * step, 2.0 * step):
+        noisy = {"theta_u": partial(converted, sd=sd)}
+        record = prepared(shipped_plant, hidden.cycles(hidden.Flaws(), 1, 3), **noisy)
+        assert position_noise(shipped_plant, record.signals) == pytest.approx(sd, rel=0.1)
+
+
+def test_a_position_without_steps_says_nothing_of_the_noise_before_the_converter(cycles, shipped_plant):
+    record = prepared(shipped_plant, cycles, theta_u=lambda x: x + 1e-6)
+    assert position_noise(shipped_plant, record.signals) is None
+
+
+def test_the_supply_is_its_voltage_without_load(cycles, shipped_plant):
+    assert supply_voltage(shipped_plant, prepared(shipped_plant, cycles).signals) == pytest.approx(48.0, abs=0.02)
+    lower = prepared(shipped_plant, cycles, u_dc=lambda x: x - 1.0).signals
+    plant, notes = as_recorded(shipped_plant, lower)
+    assert plant.inverter.V_dc == pytest.approx(47.0, abs=0.02)
+    assert "47 V in the records, 48 V in the plant file" in notes[0]
+
+
+def test_an_angle_within_one_turn_is_the_same_angle(cycles, shipped_plant):
+    whole = prepared(shipped_plant, cycles)
+    wrapped = prepared(shipped_plant, cycles, theta_m=lambda x: x % (2.0 * np.pi))
+    for a, b in zip(whole.signals, wrapped.signals, strict=True):
+        np.testing.assert_allclose(a.theta_m, b.theta_m, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_noisier_sensor_is_neither_an_effect_nor_a_fault(hidden, shipped_plant):
+    rng = np.random.default_rng(4)
+    noisy = {f"i_{j}": lambda x: x + 0.02 * rng.standard_normal(len(x)) for j in "abc"}
+    found = examine(
+        shipped_plant, prepared(shipped_plant, hidden.cycles(hidden.Flaws(), 2, 5, (hidden.chirp(),)), **noisy)
+    )
+    assert found.findings.verdict == "adequate"
+    assert max(found.findings.gain.k_after) < 0.006
