@@ -10,11 +10,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ema.core.names import FAULTS
+from ema.core.names import FAULT_MEANING, FAULTS
 
 from .health import Health
-from .history import ActuatorHistory, Series
+from .history import ActuatorHistory
 from .report_settings import ReportSettings, Severity
+from .series import Points
 
 _BLUE, _GREY = "#1f4e79", "#9aa5b1"
 COLOURS = {Severity.OK: "#2e7d4f", Severity.WATCH: "#b8860b", Severity.WARNING: "#c75b12", Severity.ALARM: "#a61b1b"}
@@ -31,18 +32,19 @@ _STYLE: Any = {
 }
 
 
-def trend(actuator: ActuatorHistory, health: Health, settings: ReportSettings, first_ns: int) -> str:
-    """Every k over time: estimates with two standard deviations, thresholds, changes of severity, remaining life."""
+def trend(actuator: ActuatorHistory, health: Health, settings: ReportSettings) -> str:
+    """Every k over time of operation: estimates ± two standard deviations, thresholds, changes of severity, breaks."""
     with matplotlib.rc_context(_STYLE):
         figure, axes = plt.subplots(2, 3, figsize=(10.2, 4.9), sharex=True, layout="constrained")
-        scale, unit = _time_unit(max(int(s.t_ns[-1]) for s in actuator.series.values()) - first_ns)
+        drawn = {method: series.points for method, series in actuator.series.items() if series.last is not None}
+        scale, unit = _time_unit(max((float(points.t_op[-1]) for points in drawn.values()), default=0.0))
         for index, (fault, ax) in enumerate(zip(FAULTS, axes.flat, strict=True)):
-            for method, series in actuator.series.items():
+            for method, points in drawn.items():
                 if method != health.method:
-                    _dots(ax, series, index, first_ns, scale, method)
+                    _dots(ax, points, index, scale, method)
             top = 0.04
             if health.method:
-                top = _band(ax, actuator.series[health.method], index, first_ns, scale, health.method)
+                top = _band(ax, drawn[health.method], index, scale, health.method)
             top = max(1.25 * top, 0.02)
             for severity, level in zip(list(Severity)[1:], settings.severity[fault].levels, strict=True):
                 if level < top:
@@ -51,16 +53,17 @@ def trend(actuator: ActuatorHistory, health: Health, settings: ReportSettings, f
                         severity.name.lower(), (1.0, level), xycoords=("axes fraction", "data"), ha="right",
                         va="bottom", color=COLOURS[severity], fontsize=7,
                     )  # fmt: skip
-            for alarm in health.alarms:
-                if alarm.fault == fault:
-                    at = (alarm.t_ns - first_ns) / 1e9 / scale
-                    ax.axvline(at, color=COLOURS[max(alarm.severity, alarm.before)], lw=0.8)
-            meaning = next((f.meaning for f in health.faults if f.fault == fault), "")
-            ax.set_title(f"{fault}  {meaning}", loc="left", fontweight="bold")
+            for change in health.changes:
+                if change.fault == fault:
+                    ax.axvline(change.t_op / scale, color=COLOURS[max(change.severity, change.before)], lw=0.8)
+            for at, _ in actuator.operating.breaks:
+                ax.axvline(at / scale, color=_GREY, lw=0.8, ls=":")
+            ax.set_title(f"{fault}  {FAULT_MEANING[fault]}", loc="left", fontweight="bold")
             ax.set_ylim(0, top)
         for ax in axes[1]:
-            ax.set_xlabel(f"time since the log's beginning [{unit}]")
-        axes[0, 0].legend(loc="upper left", fontsize=7, frameon=False)
+            ax.set_xlabel(f"time of operation [{unit}]")
+        if drawn:
+            axes[0, 0].legend(loc="upper left", fontsize=7, frameon=False)
         return _svg(figure)
 
 
@@ -83,18 +86,14 @@ def envelope(content: dict[str, Any]) -> str:
         return _svg(figure)
 
 
-def _dots(ax: Any, series: Series, index: int, first_ns: int, scale: float, method: str) -> None:
-    usable = np.flatnonzero(series.usable)
-    usable = usable[:: max(1, len(usable) // _N_POINTS)]
-    t = (series.t_ns[usable] - first_ns) / 1e9 / scale
-    ax.plot(t, series.k[usable, index], ".", ms=2, color=_GREY, label=method)
+def _dots(ax: Any, points: Points, index: int, scale: float, method: str) -> None:
+    few = slice(None, None, max(1, len(points.t_op) // _N_POINTS))
+    ax.plot(points.t_op[few] / scale, points.k[few, index], ".", ms=2, color=_GREY, label=method)
 
 
-def _band(ax: Any, series: Series, index: int, first_ns: int, scale: float, method: str) -> float:
+def _band(ax: Any, points: Points, index: int, scale: float, method: str) -> float:
     """Draw; the largest value drawn."""
-    usable = series.usable
-    t = (series.t_ns[usable] - first_ns) / 1e9 / scale
-    k, sd = series.k[usable, index], series.sd[usable, index]
+    t, k, sd = points.t_op / scale, points.k[:, index], points.sd[:, index]
     if len(t) > _N_POINTS:  # medians of equal parts
         parts = np.array_split(np.arange(len(t)), _N_POINTS)
         t, k, sd = (np.array([np.median(column[part]) for part in parts]) for column in (t, k, sd))
@@ -103,8 +102,7 @@ def _band(ax: Any, series: Series, index: int, first_ns: int, scale: float, meth
     return float(np.nanmax(k + np.nan_to_num(2 * sd)))
 
 
-def _time_unit(span_ns: int) -> tuple[float, str]:
-    seconds = span_ns / 1e9
+def _time_unit(seconds: float) -> tuple[float, str]:
     return (1.0, "s") if seconds < 600 else (60.0, "min") if seconds < 4 * 3600 else (3600.0, "h")
 
 

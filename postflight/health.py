@@ -7,22 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ema.core.names import FAULT_MEANING, FAULTS
-from ema.core.status import Status
+from ema.core.status import Reason
 
-from .history import ActuatorHistory, Series
+from .history import ActuatorHistory
 from .prognosis import Prognosis, Trend, prognosis
 from .report_settings import ReportSettings, Severity
-
-
-@dataclass(frozen=True)
-class Alarm:
-    """A fault's severity changed."""
-
-    t_ns: int
-    fault: str
-    severity: Severity
-    before: Severity
-    k: float
+from .series import Change, Last, Series
 
 
 @dataclass(frozen=True)
@@ -40,66 +30,47 @@ class FaultHealth:
 
 @dataclass(frozen=True)
 class Health:
-    """One actuator at the end of the log. Without a recent usable estimate `method` is empty and so is `faults`."""
+    """One actuator at the end of the log. Without a recent usable estimate `last` is None and `faults` is empty."""
 
     number: int
     method: str
-    t_ns: int
-    cycle: int
-    status: Status
+    last: Last | None
     faults: list[FaultHealth]
-    alarms: list[Alarm]
+    changes: list[Change]
+    n_changes: int
 
     @property
     def severity(self) -> Severity | None:
         """The worst of its faults, None when nothing is known."""
         return max((fault.severity for fault in self.faults), default=None)
 
+    @property
+    def doubted(self) -> bool:
+        """Whether the last usable estimate was made while the model was in doubt."""
+        return self.last is not None and Reason.MODEL_IN_DOUBT.name.lower() in self.last.reasons
+
 
 def health(actuator: ActuatorHistory, settings: ReportSettings, last_ns: int) -> Health:
     """Health by the first method with a recent usable estimate; `last_ns` is the end of the log."""
     for method in settings.methods:
         series = actuator.series.get(method)
-        if series is None or not series.usable.any():
+        if series is None or series.last is None:
             continue
-        last = int(np.flatnonzero(series.usable)[-1])
-        if (last_ns - int(series.t_ns[last])) / 1e9 <= settings.recent:
-            return _health(actuator.number, method, series, last, settings)
-    return Health(actuator.number, "", 0, 0, Status.NOT_ESTIMATED, [], [])
+        if (last_ns - series.last.t_ns) / 1e9 <= settings.recent:
+            return _health(actuator.number, method, series, series.last, settings)
+    return Health(actuator.number, "", None, [], [], 0)
 
 
-def _health(number: int, method: str, series: Series, last: int, settings: ReportSettings) -> Health:
-    usable = series.usable
-    t_ns, k, sd = series.t_ns[usable], series.k[usable], series.sd[usable]
-    faults, alarms = [], []
+def _health(number: int, method: str, series: Series, last: Last, settings: ReportSettings) -> Health:
+    points = series.points
+    faults = []
     for index, fault in enumerate(FAULTS):
-        changes = severities(k[:, index], fault, settings)
-        for at, severity in changes[1:]:
-            before = next(s for n, s in reversed(changes) if n < at)
-            alarms.append(Alarm(int(t_ns[at]), fault, severity, before, float(k[at, index])))
         threshold = settings.life_threshold(fault)
-        trend = Trend((t_ns - t_ns[0]) / 1e9, k[:, index], sd[:, index])
+        with np.errstate(divide="ignore"):
+            sd = 1.0 / np.sqrt(points.weight[:, index])
+        trend = Trend(points.t_op, points.k[:, index], sd)
         life = prognosis(trend, threshold, np.random.default_rng([number, index]))
-        now = float(k[-1, index]), float(sd[-1, index])
-        faults.append(FaultHealth(fault, FAULT_MEANING[fault], *now, changes[-1][1], threshold, life))
-    alarms.sort(key=lambda alarm: (alarm.t_ns, alarm.fault))
-    status = Status(int(series.status[last]))
-    return Health(number, method, int(series.t_ns[last]), int(series.cycle[last]), status, faults, alarms)
-
-
-def severities(k: np.ndarray, fault: str, settings: ReportSettings) -> list[tuple[int, Severity]]:
-    """Severity over time: index and value of every change, beginning with index 0.
-
-    It rises to the lowest, and falls to the highest, severity of `persistence` estimates in a row.
-    """
-    levels = np.searchsorted(settings.severity[fault].levels, k, side="right")
-    n = min(settings.persistence, len(levels))
-    current = Severity(int(levels[:n].min()))
-    changes = [(0, current)]
-    windows = np.lib.stride_tricks.sliding_window_view(levels, n)
-    low, high = windows.min(axis=1), windows.max(axis=1)
-    for at in np.flatnonzero((low[1:] != low[:-1]) | (high[1:] != high[:-1])) + 1:
-        if low[at] > current or high[at] < current:
-            current = Severity(int(low[at] if low[at] > current else high[at]))
-            changes.append((int(at) + n - 1, current))
-    return changes
+        now = float(last.k[index]), float(last.sd[index])
+        severity = series.tracks[fault].severity
+        faults.append(FaultHealth(fault, FAULT_MEANING[fault], *now, severity, threshold, life))
+    return Health(number, method, last, faults, list(series.changes), series.n_changes)

@@ -1,8 +1,7 @@
-"""What a report needs of a log, read in one pass: compact arrays of estimates, and few whole messages."""
+"""What a report needs of a log, read in one pass and in memory that does not grow with it."""
 
 from __future__ import annotations
 
-from array import array
 from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,80 +10,37 @@ import numpy as np
 
 from ema.core.errors import LogError
 from ema.core.names import FAULTS
-from ema.core.status import Status
 from ema.log import LogReader
 
-_N = len(FAULTS)
+from .report_settings import ReportSettings
+from .series import OperatingTime, Series
+
 _LAST = 200  # events and flagged cycles kept
-_STATUS = {status.name.lower(): int(status) for status in Status}
-
-
-@dataclass(frozen=True)
-class Series:
-    """Estimates of one actuator by one method, arrays of length n (k, sd: shape (n, 6)); NaN where there is none."""
-
-    t_ns: np.ndarray
-    cycle: np.ndarray
-    status: np.ndarray
-    p_value: np.ndarray
-    k: np.ndarray
-    sd: np.ndarray
-
-    @property
-    def usable(self) -> np.ndarray:
-        """Which are valid or degraded, with numbers."""
-        seen: np.ndarray = (self.status <= Status.DEGRADED) & np.isfinite(self.k).all(axis=1)
-        return seen
-
-
-class _Growing:
-    """A series while it is read."""
-
-    def __init__(self) -> None:
-        self.t_ns, self.cycle, self.status = array("q"), array("q"), array("b")
-        self.numbers = array("d")
-
-    def add(self, content: dict[str, Any]) -> None:
-        self.t_ns.append(content["t_ns"])
-        self.cycle.append(content["cycle"])
-        self.status.append(_STATUS[content["status"]])
-        values = [content["p_value"], *content["k"], *content["sd"]]
-        if len(values) != 1 + 2 * _N:
-            raise ValueError("k or sd is not of length 6")
-        self.numbers.extend(np.nan if value is None else value for value in values)
-
-    def finished(self) -> Series:
-        numbers = np.array(self.numbers).reshape(-1, 1 + 2 * _N)
-        t_ns, cycle, status = (np.array(column) for column in (self.t_ns, self.cycle, self.status))
-        return Series(t_ns, cycle, status, numbers[:, 0], numbers[:, 1 : 1 + _N], numbers[:, 1 + _N :])
+_PLACES = 20  # silences and steps of the clock kept
+_SILENCE = 3.0  # heartbeats come every second [s]
+_CLOCK_STEP = 0.1  # wall clock against uptime [s]
 
 
 @dataclass
 class ActuatorHistory:
     """All of one actuator.
 
-    `reasons` counts the cycles of the first method (linear) by reason, `flagged` holds the last of those estimates that
-    are not valid, `last` and `worst` the latest envelope and the one whose estimate has the lowest p-value.
+    `statuses` and `reasons` count the cycles of the first method (linear), `flagged` holds the last of all estimates
+    that are not valid, `last` and `worst` the latest envelope and the one whose estimate has the lowest p-value.
     """
 
     number: int
+    operating: OperatingTime
     series: dict[str, Series] = field(default_factory=dict)
     statuses: Counter[str] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)
     flagged: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=_LAST))
     n_flagged: int = 0
+    missing_cycles: int = 0  # numbers left out, restarts not counted
+    cycle: int | None = None  # the last one
     last: dict[str, Any] | None = None
     worst: dict[str, Any] | None = None
     worst_p: float = np.inf
-
-    @property
-    def missing_cycles(self) -> int:
-        """Cycle numbers left out between the first and the last of the log, restarts not counted."""
-        linear = self.series.get("linear")
-        if linear is None or len(linear.cycle) < 2:
-            return 0
-        steps = np.diff(linear.cycle)
-        return int((steps[steps > 1] - 1).sum())
 
 
 @dataclass
@@ -97,31 +53,28 @@ class History:
     starts: int = 0  # of the daemon, by its uptime
     status: dict[str, Any] | None = None  # the last one
     counters: Counter[str] = field(default_factory=Counter)  # over all starts
+    latency_us: int | None = None  # of the slowest answer, from a cycle's last frame to the bus
     states: Counter[str] = field(default_factory=Counter)
     log_states: Counter[str] = field(default_factory=Counter)
-    silences: list[tuple[int, float]] = field(default_factory=list)  # of the heartbeat: time [ns], length [s]
-    clock_steps: list[tuple[int, float]] = field(default_factory=list)  # time [ns] and size [s]
+    silences: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_PLACES))  # time [ns], length [s]
+    n_silences: int = 0
+    clock_steps: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_PLACES))  # time [ns], size [s]
+    n_clock_steps: int = 0
     first_ns: int = 0
     last_ns: int = 0
 
 
-_SILENCE = 3.0  # heartbeats come every second [s]
-_CLOCK_STEP = 0.1  # wall clock against uptime [s]
-
-
-def read(log: LogReader) -> History:
+def read(log: LogReader, settings: ReportSettings) -> History:
     """Read everything but the raw frames. LogError when the log holds no estimate."""
     history = History()
-    growing: dict[tuple[int, str], _Growing] = {}
     for topic, t_ns, content in log.messages():
         history.first_ns = min(history.first_ns or t_ns, t_ns)
         history.last_ns = max(history.last_ns, t_ns)
         try:
             if topic.startswith("/estimate/"):
-                growing.setdefault((content["actuator"], content["method"]), _Growing()).add(content)
-                _note_estimate(_actuator(history, content), content)
+                _note_estimate(_actuator(history, content, settings), content, settings)
             elif topic.startswith("/envelope/"):
-                _note_envelope(_actuator(history, content), content)
+                _note_envelope(_actuator(history, content, settings), content)
             elif topic == "/event":
                 history.events.append(content)
                 history.event_counts[content["level"]] += 1
@@ -129,25 +82,34 @@ def read(log: LogReader) -> History:
                 _note_status(history, content)
         except (KeyError, TypeError, ValueError) as error:
             raise LogError(f"a message on {topic} is not what this version writes ({error!r})") from error
-    if not growing:
+    if not any(actuator.series for actuator in history.actuators.values()):
         raise LogError(f"{', '.join(path.name for path in log.paths)}: no estimate in it")
-    for (actuator, method), series in growing.items():
-        history.actuators[actuator].series[method] = series.finished()
     history.actuators = dict(sorted(history.actuators.items()))
     return history
 
 
-def _actuator(history: History, content: dict[str, Any]) -> ActuatorHistory:
-    return history.actuators.setdefault(content["actuator"], ActuatorHistory(content["actuator"]))
+def _actuator(history: History, content: dict[str, Any], settings: ReportSettings) -> ActuatorHistory:
+    number = content["actuator"]
+    if number not in history.actuators:
+        history.actuators[number] = ActuatorHistory(number, OperatingTime(settings.longest_gap))
+    return history.actuators[number]
 
 
-def _note_estimate(actuator: ActuatorHistory, content: dict[str, Any]) -> None:
+def _note_estimate(actuator: ActuatorHistory, content: dict[str, Any], settings: ReportSettings) -> None:
+    method = content["method"]
+    if method not in actuator.series:
+        levels = {fault: settings.severity[fault].levels for fault in FAULTS}
+        actuator.series[method] = Series(levels, settings.persistence)
+    actuator.series[method].add(content, actuator.operating.at(content["t_ns"]))
     if content["status"] != "valid":
         actuator.flagged.append(content)
         actuator.n_flagged += 1
-    if content["method"] == "linear":
+    if method == "linear":
         actuator.statuses[content["status"]] += 1
         actuator.reasons.update(content["reasons"])
+        if actuator.cycle is not None:
+            actuator.missing_cycles += max(0, content["cycle"] - actuator.cycle - 1)
+        actuator.cycle = content["cycle"]
         p_value = content["p_value"]
         if p_value is not None and p_value < actuator.worst_p:
             actuator.worst_p, actuator.worst = p_value, content | {"awaited": True}
@@ -166,7 +128,10 @@ def _note_status(history: History, content: dict[str, Any]) -> None:
     before = history.status
     history.states[content["state"]] += 1
     history.log_states[content["log_state"]] += 1
-    counters: dict[str, int] = content["counters"]
+    counters: dict[str, int] = dict(content["counters"])
+    latency_us = counters.pop("latency_us", None)
+    if latency_us is not None:
+        history.latency_us = max(history.latency_us or 0, latency_us)
     if before is None or content["uptime"] < before["uptime"]:
         history.starts += 1
         history.counters.update(counters)
@@ -175,6 +140,8 @@ def _note_status(history: History, content: dict[str, Any]) -> None:
         wall, up = (content["t_ns"] - before["t_ns"]) / 1e9, content["uptime"] - before["uptime"]
         if up > _SILENCE:
             history.silences.append((before["t_ns"], up))
+            history.n_silences += 1
         if abs(wall - up) > _CLOCK_STEP:
             history.clock_steps.append((content["t_ns"], wall - up))
+            history.n_clock_steps += 1
     history.status = content

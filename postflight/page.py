@@ -14,27 +14,54 @@ import yaml
 from markupsafe import Markup
 
 from ema.core.names import FAULT_MEANING, FAULTS
+from ema.core.status import Status
 from ema.log import LogReader
 
 from .health import Health, health
-from .history import ActuatorHistory, History, read
+from .history import ActuatorHistory, read
 from .report_settings import ReportSettings, Severity
 from .times import iso
+
+# Counters of the heartbeat (`daemon/health.py`) in words; others are shown by their names.
+_COUNTED = {
+    "n_cycles": "cycles of all actuators",
+    "n_estimates": "cycles with a usable estimate",
+    "n_good": "frames without fault",
+    "n_lost": "frames lost",
+    "n_reordered": "frames late",
+    "n_repeated": "frames sent twice",
+    "n_crc_error": "frames with a wrong CRC",
+    "n_wrong_counter": "frames with a wrong counter",
+    "n_wrong_length": "frames of a wrong length",
+    "n_refused": "frames that message authentication refused",
+    "n_timeout": "messages that did not come in time",
+    "n_foreign": "frames of others",
+    "kernel_drops": "frames dropped by the kernel",
+    "n_received": "frames received",
+    "n_sent": "frames sent",
+    "n_send_failed": "frames not sent",
+    "n_error_frames": "error frames of the CAN controller",
+    "n_unreadable": "frames that could not be read",
+    "n_link_down": "times the link was down",
+    "n_not_logged": "frames and messages not logged",
+    "n_skipped": "cycles that a slower identifier skipped",
+    "n_failed": "cycles in which a slower identifier failed",
+}
 
 
 def page(log: LogReader, settings: ReportSettings) -> str:
     """HTML of the report. LogError when the log holds no estimate."""
     matplotlib.use("svg")
-    history = read(log)
+    history = read(log, settings)
     attachments = log.attachments()
-    actuators = [_actuator(one, health(one, settings, history.last_ns), settings, history) for one in
-                 history.actuators.values()]  # fmt: skip
+    actuators = [_actuator(one, health(one, settings, history.last_ns), settings) for one in history.actuators.values()]
     return (
         _environment()
         .get_template("report.html.j2")
         .render(
             actuators=actuators,
             history=history,
+            counted=_COUNTED,
             settings=settings,
             faults=FAULTS,
             meanings=FAULT_MEANING,
@@ -79,7 +106,7 @@ def _environment() -> jinja2.Environment:
     return environment
 
 
-def _actuator(actuator: ActuatorHistory, now: Health, settings: ReportSettings, history: History) -> dict[str, Any]:
+def _actuator(actuator: ActuatorHistory, now: Health, settings: ReportSettings) -> dict[str, Any]:
     from . import figures
 
     envelopes = []
@@ -91,7 +118,8 @@ def _actuator(actuator: ActuatorHistory, now: Health, settings: ReportSettings, 
     return {
         "history": actuator,
         "health": now,
-        "trend": _inline(figures.trend(actuator, now, settings, history.first_ns)),
+        "statuses": [(s.name.lower(), actuator.statuses[s.name.lower()]) for s in Status],
+        "trend": _inline(figures.trend(actuator, now, settings)),
         "envelopes": [{"caption": text, "src": _inline(figures.envelope(content))} for text, content in envelopes],
     }
 

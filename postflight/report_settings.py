@@ -41,16 +41,13 @@ class Thresholds(Settings):
         """In the order of Severity, from WATCH."""
         return self.watch, self.warning, self.alarm
 
-    def severity(self, k: float) -> Severity:
-        """Severity of one value."""
-        return Severity(sum(k >= level for level in self.levels))
-
 
 class ReportSettings(Settings):
     """The whole configuration of the report."""
 
     methods: list[Method] = Field(default=["hf", "lf2", "linear"], min_length=1)
     recent: float = quantity("s", "age of the oldest estimate taken for the health", 60.0, gt=0)
+    longest_gap: float = quantity("s", "a longer silence is a break, not time of operation", 60.0, gt=0)
     persistence: int = Field(default=3, ge=1, le=1000, description="estimates in a row that change the severity")
     severity: dict[str, Thresholds] = Field(description="by fault")
     life_until: Literal["watch", "warning", "alarm"] = "alarm"

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
-from ema_postflight.health import severities
 from ema_postflight.report import report
 from ema_postflight.report_settings import ReportSettings, Severity
+from ema_postflight.series import MOST, OperatingTime, Series, SeverityTrack
 
 from ema.core import config, resources
 from ema.core.errors import ConfigError, LogError
@@ -109,12 +109,14 @@ def test_severity_needs_persistence():
     ok, watch, warning = 0.01, 0.10, 0.20
 
     def run(*k):
-        return severities(np.array(k), "k1", settings)
+        track = SeverityTrack(settings.severity["k1"].levels, settings.persistence)
+        changes = [(at, track.severity) for at, value in enumerate(k) if track.add(value) is not None]
+        return changes, track.severity
 
-    assert run(ok, ok, ok, warning, ok, warning, ok) == [(0, Severity.OK)]
-    assert run(ok, ok, ok, watch, warning, watch, watch) == [(0, Severity.OK), (5, Severity.WATCH)]
-    assert run(warning, warning, warning, ok, watch, ok) == [(0, Severity.WARNING), (5, Severity.WATCH)]
-    assert run(ok) == [(0, Severity.OK)]
+    assert run(ok, ok, ok, warning, ok, warning, ok) == ([], Severity.OK)
+    assert run(ok, ok, ok, watch, warning, watch, watch) == ([(5, Severity.WATCH)], Severity.WATCH)
+    assert run(warning, warning, warning, ok, watch, ok) == ([(5, Severity.WATCH)], Severity.WATCH)
+    assert run(ok) == ([], Severity.OK)
 
 
 def test_thresholds_come_from_the_configuration(flight, tmp_path):
@@ -148,3 +150,39 @@ def test_nothing_is_overwritten_and_an_empty_log_is_told(flight, page, tmp_path)
     arguments = [str(flight), "--out", str(tmp_path / "r.html"), "--start", "9999"]
     with pytest.raises(LogError, match="no estimate"):
         CliRunner().invoke(report, arguments, catch_exceptions=False)
+
+
+def _series(n, sd=0.01):
+    rng = np.random.default_rng(4)
+    series = Series({f"k{i}": (0.05, 0.15, 0.3) for i in range(1, 7)}, 3)
+    k = 0.1 * np.linspace(0, 1, n)[:, None] + sd * rng.standard_normal((n, 6))
+    for at, row in enumerate(k):
+        content = {"t_ns": at, "cycle": at, "status": "valid", "reasons": [], "k": row.tolist(), "sd": [sd] * 6}
+        series.add(content, float(at))
+    return series, k
+
+
+def test_a_long_series_is_kept_in_bounded_memory_without_losing_its_mean_last_value_or_information():
+    n, sd = 5 * MOST + 3, 0.01
+    series, k = _series(n, sd)
+    points = series.points
+    assert MOST // 2 <= len(points.t_op) <= MOST
+    assert (np.diff(points.t_op) > 0).all()
+    assert points.weight.sum(axis=0) == pytest.approx(n / sd**2)
+    mean = (points.weight * points.k).sum(axis=0) / points.weight.sum(axis=0)
+    assert mean == pytest.approx(k.mean(axis=0), rel=1e-9)
+    assert points.sd == pytest.approx(sd)
+    assert series.last.k.tolist() == k[-1].tolist()
+    assert (series.last.cycle, series.n_changes) == (n - 1, sum(_n_changes(column) for column in k.T))
+
+
+def _n_changes(k):
+    track = SeverityTrack((0.05, 0.15, 0.3), 3)
+    return sum(track.add(value) is not None for value in k)
+
+
+def test_breaks_between_flights_are_not_time_of_operation():
+    time = OperatingTime(60.0)
+    t = [0, 10, 20, 3620, 3630, 3625, 0, 5]  # a break of an hour, an estimate that comes late, a clock set back
+    assert [time.at(round(x * 1e9)) for x in t] == [0, 10, 20, 20, 30, 25, 30, 35]
+    assert list(time.breaks) == [(20.0, 3600.0)]
