@@ -11,6 +11,7 @@ import importlib.util
 import json
 import sys
 import time
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -28,6 +29,7 @@ from ema.models.actuator import Actuator
 SUPPORT = Path(__file__).parents[1] / "tests" / "support"
 
 
+@cache
 def support(name: str) -> ModuleType:
     """A module of tests/support."""
     spec = importlib.util.spec_from_file_location(name, SUPPORT / f"{name}.py")
@@ -39,15 +41,16 @@ def support(name: str) -> ModuleType:
     return module
 
 
-def trial(name: str, seed: int, n_cycles: int) -> dict[str, Any]:
+def trial(name: str, seed: int, n_cycles: int, *, varied: bool = True, n_threads: int = 2) -> dict[str, Any]:
     """One hidden flaw, found or not."""
     hidden, cases = support("hidden_actuator"), support("hidden_cases")
     values, k = cases.draw(name, seed)
     flaws = hidden.Flaws(**values, **{f"k{j + 1}": x for j, x in enumerate(k)})
-    record = Record(tuple(Cycle(n, c) for n, c in enumerate(hidden.cycles(flaws, n_cycles, seed))))
+    motions, bench = cases.draw_bench(hidden, name, seed) if varied else (hidden.MOTIONS, hidden.Bench())
+    record = Record(tuple(Cycle(n, c) for n, c in enumerate(hidden.cycles(flaws, n_cycles, seed, motions, bench))))
     plant = config.load(resources.config("actuator.yaml"), Actuator)
     begun = time.process_time()
-    findings = examine(plant, measured(plant, [record])).findings.as_dict()
+    findings = examine(plant, measured(plant, [record]), n_threads=n_threads).findings.as_dict()
     found = {f"{e['name']}.{p}": q["value"] for e in findings["effects"] for p, q in e["parameters"].items()}
     errors = {p: found[p] / truth(values) - 1.0 for p, truth in cases.CASES[name].parameters.items() if p in found}
     gain = findings["gain"]
@@ -57,6 +60,8 @@ def trial(name: str, seed: int, n_cycles: int) -> dict[str, Any]:
         "parameter_errors": errors, **gain["heldout"],
         "err_k_before": _err_k(gain["k_before"], k), "err_k_after": _err_k(gain["k_after"], k),
         "false_alarms": [gain["false_alarms_before"], gain["false_alarms_after"]], "cpu_s": time.process_time() - begun,
+        "motions": "varied" if varied else "test chirps", "tried": findings["tried"][:8],
+        "said": findings["structure"].get("sentences", []) + findings["notes"],
     }  # fmt: skip
 
 
@@ -95,8 +100,10 @@ def table(rows: list[dict[str, Any]]) -> str:
 @click.option("--first", default=0, show_default=True, help="first seed")
 @click.option("--case", "only", multiple=True, help="only these (repeatable)")
 @click.option("--cycles", default=6, show_default=True, help="recorded cycles of a trial")
+@click.option("--varied/--test-chirps", default=True, show_default=True, help="motions, noise, place of many benches")
+@click.option("--threads", default=2, show_default=True)
 @click.option("--out", type=click.Path(path_type=Path), default=Path("var/discrepancy.jsonl"), show_default=True)
-def main(seeds: int, first: int, only: tuple[str, ...], cycles: int, out: Path) -> None:
+def main(seeds: int, first: int, only: tuple[str, ...], cycles: int, varied: bool, threads: int, out: Path) -> None:
     """Run missing trials and print the table."""
     out.parent.mkdir(parents=True, exist_ok=True)
     rows = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
@@ -104,7 +111,7 @@ def main(seeds: int, first: int, only: tuple[str, ...], cycles: int, out: Path) 
     for seed in range(first, first + seeds):
         for name in only or support("hidden_cases").CASES:
             if (name, seed) not in done:
-                row = trial(name, seed, cycles)
+                row = trial(name, seed, cycles, varied=varied, n_threads=threads)
                 rows.append(row)
                 with out.open("a") as file:
                     file.write(json.dumps(row) + "\n")

@@ -3,7 +3,8 @@
 Shares no code with `ema`: the finder is tested on data it did not make. Equations: wye-connected motor with floating
 neutral and trapezoidal coefficients, hysteresis current control at 1 µs, four-state dry friction, backlash, cascade
 control at 10 kHz, two 2 kHz anti-alias stages, 12-bit current ADC. Where physics allows, flaws have another functional
-form than the library's effects (see `Flaws`).
+form than the library's effects (see `Flaws`). The bench (`Bench`) draws its own motions, noise, integration step and
+position.
 """
 
 from __future__ import annotations
@@ -14,8 +15,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-SUBSTEPS = 100
-DT = 1e-6
+TICK = 1e-4  # [s]
 
 
 class Flaws(NamedTuple):
@@ -79,7 +79,21 @@ class Flaws(NamedTuple):
     hum_frequency: float = 187.0  # [Hz]
     shaker: float = 0.0  # [N m] torque at a fixed frequency
     shaker_frequency: float = 83.0  # [Hz]
-    weak_leg: float = 0.0  # share of switching commands to "up" that leg B ignores
+    weak_leg: float = 0.0  # share of switching commands to "up" that leg B ignores, until the next control tick
+    inertia: float = 0.0  # relative change of the rotor's inertia
+    speed_gain: float = 0.0  # relative change of the speed loop's gain
+
+
+class Bench(NamedTuple):
+    """What the finder must not mind."""
+
+    current_noise: float = 5e-3  # [A] rms
+    lvdt_noise: float = 4e-6  # [rad] rms
+    substeps: int = 100  # integration steps in a control tick
+    position: float = 0.0  # [rad] at the user, around which everything moves
+
+
+BENCH = Bench()
 
 
 class State(NamedTuple):
@@ -92,11 +106,12 @@ class State(NamedTuple):
     u_dc: np.ndarray
 
 
-def rest() -> State:
-    return State(np.zeros(3), np.zeros((2, 3)), np.ones(3), np.zeros(4), np.array([48.0]))
+def rest(position: float = 0.0) -> State:
+    mechanics = np.array([500.0 * position, 0.0, position, 0.0])
+    return State(np.zeros(3), np.zeros((2, 3)), np.ones(3), mechanics, np.array([48.0]))
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _trapezoid(angle):
     x = (angle / (2.0 * math.pi)) % 1.0  # 0…1, as the sine
     if x < 0.25:
@@ -108,7 +123,7 @@ def _trapezoid(angle):
     return min(max(y, -1.0), 1.0)
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _commutated(angle):
     x = (angle / (2.0 * math.pi)) % 1.0
     if 1.0 / 12.0 <= x <= 5.0 / 12.0:
@@ -118,16 +133,16 @@ def _commutated(angle):
     return 0.0
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _loss(x):
     """tanh(x)/x"""
     return 1.0 if abs(x) < 1e-4 else math.tanh(x) / x
 
 
-@numba.njit
-def _run(f, command, lvdt_noise, t0, rng_switch, i, flt, sw, mech, link, out):
-    R, L, k_e, p, J, C = 1.065, 0.36e-3, 0.0376, 2.0, 2.5e-5, 3e-5
-    V, h, I_max, GR, K_p, K_w = 48.0, 0.25, 22.5, 500.0, 6e4, 0.05
+@numba.njit(cache=True)
+def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, link, out):
+    R, L, k_e, p, J, C = 1.065, 0.36e-3, 0.0376, 2.0, 2.5e-5 * (1.0 + f.inertia), 3e-5
+    V, h, I_max, GR, K_p, K_w = 48.0, 0.25, 22.5, 500.0, 6e4, 0.05 * (1.0 + f.speed_gain)
     F_s, F_d = 0.04 * (1.0 + 3.0 * f.k1), 0.02 * (1.0 + 3.0 * f.k1)
     b, stop, lsb = 1e-5 * (1.0 + 100.0 * f.k2), 0.4, 1.5e-5
     N = np.array([1.0 - f.k3, 1.0 - f.k4, 1.0 - f.k5])
@@ -138,10 +153,10 @@ def _run(f, command, lvdt_noise, t0, rng_switch, i, flt, sw, mech, link, out):
     kappa, v, x, di, Lj, Rj = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     n = len(command)
     log_u, log_w = np.zeros(n), np.zeros(n)
-    T = DT * SUBSTEPS * (1.0 + f.clock_skew)
-    dt = T / SUBSTEPS
+    T = TICK * (1.0 + f.clock_skew)
+    dt = T / substeps
     I_ref, last_error = 0.0, 0.0
-    draw = 0
+    draw, deaf = 0, -1
     for tick in range(n):
         theta, w, theta_u, w_u = mech[0], mech[1], mech[2], mech[3]
         error = (
@@ -174,7 +189,7 @@ def _run(f, command, lvdt_noise, t0, rng_switch, i, flt, sw, mech, link, out):
         out[3, tick], out[4, tick], out[5, tick] = theta + error, seen_u, link[0]
         if tick == n - 1:
             break
-        for sub in range(SUBSTEPS):
+        for sub in range(substeps):
             theta, w, theta_u, w_u = mech[0], mech[1], mech[2], mech[3]
             now = t0 + tick * T + sub * dt
             # the motor
@@ -207,8 +222,10 @@ def _run(f, command, lvdt_noise, t0, rng_switch, i, flt, sw, mech, link, out):
                 elif wish < -h:
                     sw[j] = -1.0
                 if j == 1 and f.weak_leg > 0.0 and sw[j] > previous:
-                    draw = (draw + 1) % len(rng_switch)
-                    if rng_switch[draw] < f.weak_leg:
+                    if deaf != tick:
+                        draw = (draw + 1) % len(rng_switch)
+                        deaf = tick if rng_switch[draw] < f.weak_leg else -1
+                    if deaf == tick:
                         sw[j] = -1.0
                 if sw[j] != previous:
                     blank[j] = f.dead_time
@@ -275,17 +292,27 @@ def _run(f, command, lvdt_noise, t0, rng_switch, i, flt, sw, mech, link, out):
             mech[2], mech[3] = theta_u, w_u
 
 
-def cycle(flaws: Flaws, command: np.ndarray, state: State, seed: int) -> dict[str, np.ndarray]:
+def cycle(flaws: Flaws, command: np.ndarray, state: State, seed: int, bench: Bench = BENCH) -> dict[str, np.ndarray]:
     """One recorded cycle at 10 kHz; `state` is advanced. Channels by name."""
     rng = np.random.default_rng(seed)
     n = len(command)
     out = np.zeros((6, n))
     flaws = Flaws(*(float(x) for x in flaws))
     _run(
-        *(flaws, np.ascontiguousarray(command, dtype=float), 4e-6 * rng.standard_normal(n), 10.0 * rng.random()),
-        *(rng.random(4096), state.i, state.filtered, state.switch, state.mechanics, state.u_dc, out),
+        *(flaws, np.ascontiguousarray(command, dtype=float), bench.lvdt_noise * rng.standard_normal(n)),
+        *(
+            bench.substeps,
+            10.0 * rng.random(),
+            rng.random(4096),
+            state.i,
+            state.filtered,
+            state.switch,
+            state.mechanics,
+            state.u_dc,
+            out,
+        ),
     )
-    i = np.clip(out[:3] + 5e-3 * rng.standard_normal((3, n)), -flaws.adc_limit, flaws.adc_limit)
+    i = np.clip(out[:3] + bench.current_noise * rng.standard_normal((3, n)), -flaws.adc_limit, flaws.adc_limit)
     step = 60.0 / 4096
     i = step * np.round(i / step)
     names = ("i_a", "i_b", "i_c")
@@ -300,21 +327,81 @@ def cycle(flaws: Flaws, command: np.ndarray, state: State, seed: int) -> dict[st
 
 
 def chirp(amplitude: float = 5e-3, f_end: float = 15.0, duration: float = 0.5) -> np.ndarray:
-    t = np.arange(round(duration * 1e4) + 1) / 1e4
+    t = _times(duration)
     return amplitude * np.sin(np.pi * f_end * t**2 / duration)
+
+
+def _times(duration: float) -> np.ndarray:
+    return np.arange(round(duration * 1e4) + 1) / 1e4
 
 
 MOTIONS = (chirp(), chirp(0.02, 3.0))  # fast and short; slow over three rotor turns
 
 
+def sine(amplitude: float, f: float, duration: float) -> np.ndarray:
+    return amplitude * np.sin(2.0 * np.pi * f * _times(duration))
+
+
+def triangle(amplitude: float, f: float, duration: float) -> np.ndarray:
+    return amplitude * 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * f * _times(duration)))
+
+
+def steps(amplitude: float, f: float, duration: float) -> np.ndarray:
+    """Steps up, back, down, back; held for a quarter of a period each."""
+    return amplitude * np.round(np.sin(2.0 * np.pi * f * _times(duration) + 1e-9))
+
+
+def ramps(amplitude: float, f: float, duration: float) -> np.ndarray:
+    """Ramps with holds between them."""
+    return np.clip(1.6 * triangle(amplitude, f, duration), -amplitude, amplitude)
+
+
+def two_tones(amplitude: float, f: float, duration: float) -> np.ndarray:
+    return 0.6 * sine(amplitude, 0.4 * f, duration) + 0.4 * sine(amplitude, 1.3 * f, duration)
+
+
+SHAPES = (chirp, sine, triangle, steps, ramps, two_tones)
+
+
+def drawn_motion(rng: np.random.Generator) -> np.ndarray:
+    """Another shape, amplitude and pace: rotor speeds of 60 to 230 rad/s, amplitudes of half to four rotor turns."""
+    shape = SHAPES[int(rng.integers(len(SHAPES)))]
+    amplitude = float(np.exp(rng.uniform(np.log(2e-3), np.log(2e-2))))
+    f = float(rng.uniform(60.0, 230.0)) / (2.0 * np.pi * amplitude * 500.0)
+    duration = max(0.5, 1.2 / f) if shape is not chirp else 0.5
+    return np.round(shape(amplitude, min(f, 20.0), min(duration, 0.8)), 7)
+
+
+def drawn_motions(rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+    """The test chirps, one motion only, two or three others in turn, or many that are all different."""
+    kind = rng.choice(["test", "one", "some", "many"], p=[0.3, 0.2, 0.35, 0.15])
+    if kind == "test":
+        return MOTIONS
+    return tuple(drawn_motion(rng) for _ in range({"one": 1, "some": int(rng.integers(2, 4)), "many": 6}[kind]))
+
+
+def drawn_bench(rng: np.random.Generator) -> Bench:
+    """Noise, step and place of a bench that is not ours."""
+    return Bench(
+        float(rng.uniform(3e-3, 7e-3)), float(rng.uniform(2e-6, 6e-6)), int(rng.choice([100, 200])),
+        float(rng.choice([0.0, rng.uniform(-0.1, 0.1)])),
+    )  # fmt: skip
+
+
 def cycles(
-    flaws: Flaws, n: int = 6, seed: int = 0, motions: tuple[np.ndarray, ...] = MOTIONS
+    flaws: Flaws,
+    n: int = 6,
+    seed: int = 0,
+    motions: tuple[np.ndarray, ...] = MOTIONS,
+    bench: Bench = BENCH,
 ) -> list[dict[str, np.ndarray]]:
     """`n` consecutive cycles, motions in turn; between cycles the actuator is led back and comes to rest."""
-    found, state = [], rest()
+    found, state = [], rest(bench.position)
+    _ = cycle(flaws, np.full(500, bench.position), state, 1000 * seed + 999, bench)
     for number in range(n):
-        command = motions[number % len(motions)]
-        found.append(cycle(flaws, command, state, 1000 * seed + number))
-        back = found[-1]["theta_cmd"][-1] * np.linspace(1.0, 0.0, 2000) ** 2
-        _ = cycle(flaws, np.concatenate([back, np.zeros(500)]), state, 1000 * seed + 500 + number)
+        command = bench.position + motions[number % len(motions)]
+        found.append(cycle(flaws, command, state, 1000 * seed + number, bench))
+        back = bench.position + motions[number % len(motions)][-1] * np.linspace(1.0, 0.0, 2000) ** 2
+        rested = np.concatenate([back, np.full(500, bench.position)])
+        _ = cycle(flaws, rested, state, 1000 * seed + 500 + number, bench)
     return found

@@ -121,7 +121,9 @@ CASES: dict[str, Case] = {
     "slow current loop": Case(_one("slew", 300.0, 1500.0), outside=True),
     "hum on phase A": Case(_one("hum", 0.05, 0.2), outside=True),
     "shaker": Case(_one("shaker", 0.004, 0.015), outside=True),
-    "weak leg": Case(_one("weak_leg", 0.1, 0.4), outside=True),
+    "weak leg": Case(_one("weak_leg", 0.01, 0.1), outside=True),
+    "heavier rotor": Case(_one("inertia", 0.1, 0.3), outside=True),
+    "speed loop's gain": Case(_one("speed_gain", -0.3, -0.1), outside=True),
 }  # fmt: skip
 
 
@@ -135,6 +137,13 @@ def draw(name: str, seed: int) -> tuple[dict[str, float], list[float]]:
     elif name == "faults" and not k.any():
         k[int(rng.integers(6))] = 0.05
     return values, k.tolist()
+
+
+def draw_bench(hidden: Any, name: str, seed: int) -> tuple[Any, Any]:
+    """Motions and bench of one trial; `hidden` is the module hidden_actuator."""
+    rng = np.random.default_rng([seed, 1, *name.encode()])
+    motions, bench = hidden.drawn_motions(rng), hidden.drawn_bench(rng)
+    return motions, bench._replace(position=0.0) if name == "position_friction" else bench
 
 
 def outcome(name: str, findings: dict[str, Any]) -> str:

@@ -153,6 +153,8 @@ def candidates(data: Measured, torques: Sequence[Torque]) -> list[Candidate]:
     top = max(float(np.abs(s.i).max()) for s in data.signals)
     if any(int((np.abs(s.i) > top - FLAT).sum()) >= FLAT_SAMPLES for s in data.signals):
         found.append(_plain("adc_saturation", "limit", step={"limit": top - 30.0}))
+    if not torques:
+        return found
     for order, _ in lines(torques):
         frees = (
             free("cogging.amplitude", 0.002),

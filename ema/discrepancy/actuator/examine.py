@@ -29,7 +29,10 @@ STRONG = 0.6  # share of what is left that a further effect must take when there
 NAMED = 0.5  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
 OWN_SHARE = 0.5  # of a gain that must go when the effect alone is switched off
 ALIKE = 0.6  # share by which two models may leave more or less and be alike: laws are approximations
+NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
 CHANCE = 0.02  # difference in misfit that seeds make
+SAME = 0.05  # difference in held-out misfit up to which fewer causes are preferred
+NEARLY = 0.5  # excess of a model that may be the right one but for switching
 SLACK = 0.1  # misfit that switching noise may make
 ENVELOPE_SETTLING = 15e-3  # [s]
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
@@ -79,8 +82,9 @@ def examine(
         search.noise = Noise(ema, before.fit.point)
     v = verdict_before = search.verdict(before)
     say(f"faults only: p = {v.p_value:.2g}, most visible: {v.loudest}")
-    after = before
+    after, left = before, before.excess
     alike: list[tuple[str, ...]] = []
+    after, v = _simpler(search, after, v, alike)
     while not v.is_noise and len(after.effects) < MAX_EFFECTS:
         enough = after is not before and after.excess < ENOUGH * before.excess + SLACK
         models = search.extend(after)
@@ -91,13 +95,30 @@ def examine(
         best = real[0]
         alike.append(tuple(m.names[-1] for m in real[1:] if m.heldout - best.heldout < ALIKE * best.excess + CHANCE))
         after = best
-        if after.excess < 1.0:
+        if after.excess < NEW_NOISE * left:  # what runs differ by depends on the point, and so does every weight
+            left = max(after.excess, CHANCE)
             search.noise = Noise(ema, after.fit.point)
+            after = search.model(after.effects, after.fit.free, after.fit.point, after.fit.columns, 2)
         v = search.verdict(after)
         say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
+    after, v = _simpler(search, after, v, alike)
     findings = _findings(search, before, after, v, alike)
     findings.notes.extend(conditions)
     return Examination(findings, search, before, after, verdict_before, v)
+
+
+def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+    """`model`, or where it leaves little, one with an effect for several faults that leaves no more."""
+    if not v.is_noise and model.excess > NEARLY:
+        return model, v
+    for m in search.instead_of_faults(model):
+        w = search.verdict(m)
+        if m.heldout < model.heldout + SAME and (w.is_noise or not v.is_noise):
+            gone = [name for name in FAULTS if name not in {f.name for f in m.fit.free}]
+            alike.append((f"{' and '.join(gone)} alike",))
+            search.say(f"{m.names[-1]} instead of {', '.join(gone)}: p = {w.p_value:.2g}")
+            return m, w
+    return model, v
 
 
 def _does_it(search: Search, model: Model, previous: Model) -> bool:

@@ -15,7 +15,7 @@ from .features import Array
 from .noise import Noise
 from .plant import EmaPlant, Point
 
-N_SEEDS = 10  # for a column of the Jacobian, and for the base while searching
+N_SEEDS = 12  # for a column of the Jacobian, and for the base while searching
 SEED = 1_000_000
 K_STEP = 0.03  # below, the switching noise of a difference is as large as the difference
 LENGTH = 150.0  # of a step, in standard deviations of a cycle: four times the noise of one cycle's features
@@ -92,7 +92,8 @@ def residuals(
     plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int], n_seeds: int = N_SEEDS, seed: int = SEED
 ) -> dict[int, Array]:
     """Whitened measured less mean simulated features, by cycle."""
-    return {c: noise.of(c).white(plant.data.y[c] - plant.mean([point], c, n_seeds, seed + 1000 * c)[0]) for c in cycles}
+    means = plant.means(point, cycles, n_seeds, seed)
+    return {c: noise.of(c).white(plant.data.y[c] - means[c]) for c in cycles}
 
 
 def stacked_jacobian(noise: Noise, frees: Sequence[Free], cols: Columns, cycles: Sequence[int]) -> Array:
@@ -125,6 +126,17 @@ def moved(point: Point, frees: Sequence[Free], step: Array) -> Point:
     return {**point, **{f.name: point.get(f.name, 0.0) + float(d) for f, d in zip(frees, step, strict=True)}}
 
 
+def _is_stale(f: Free, frees: Sequence[Free], point: Point, at: Point) -> bool:
+    """Whether a column taken at `at` no longer holds: a fault moved, or the parameters of the same effect did."""
+    mine = f.name.split(".")[0]
+    if f.name in FAULTS:
+        return any(abs(point.get(n, 0.0) - at.get(n, 0.0)) > K_STEP for n in FAULTS)
+    moved_far = any(abs(point.get(n, 0.0) - at.get(n, 0.0)) > 2.0 * K_STEP for n in FAULTS)
+    return moved_far or any(
+        abs(point.get(g.name, 0.0) - at.get(g.name, 0.0)) > abs(g.step) for g in frees if g.name.split(".")[0] == mine
+    )
+
+
 def fit(
     plant: EmaPlant,
     noise: Noise,
@@ -138,16 +150,15 @@ def fit(
     """Gauss–Newton from `start`; columns in `known` are used in the first iteration instead of new ones."""
     motions = sorted({int(plant.data.motion[c]) for c in cycles})
     point: Point = dict(start)
-    old: Point = point
     res = residuals(plant, noise, point, cycles)
     cost = sum(float(r @ r) for r in res.values())
     cols: Columns = dict(known or {})
     J = np.empty((0, 0))
     steps: dict[str, float] = {}
-    for iteration in range(n_iterations):
-        stale = [f for f in frees if iteration > 0 or (motions[0], f.name) not in cols]
-        if iteration > 0 and max(abs(point.get(n, 0.0) - old.get(n, 0.0)) for n in FAULTS) < K_STEP:
-            stale = [f for f in stale if f.name not in FAULTS]  # faults hardly moved: their columns still hold
+    at: dict[str, Point] = dict.fromkeys((f.name for f in frees if (motions[0], f.name) in cols), point)
+    for _ in range(n_iterations):
+        stale = [f for f in frees if f.name not in at or _is_stale(f, frees, point, at[f.name])]
+        at |= {f.name: point for f in stale}
         stale = [replace(f, step=steps.get(f.name, f.step)) for f in stale]
         cols |= columns(plant, stale, point, motions)
         J = stacked_jacobian(noise, frees, cols, cycles)
@@ -158,9 +169,9 @@ def fit(
         }
         r = np.concatenate([res[c] for c in cycles])
         step, promised = bounded(J, r, *bounds(frees, point))
-        if cost - promised < 4.0 * len(frees) and iteration > 0:
+        if cost - promised < 4.0 * len(frees) and not stale:
             break
-        old, improved = point, False
+        improved = False
         for share in (1.0, 0.5, 0.2):
             candidate = moved(point, frees, share * step)
             new = residuals(plant, noise, candidate, cycles)
@@ -169,7 +180,11 @@ def fit(
                 gained, improved = cost - new_cost, True
                 point, res, cost = candidate, new, new_cost
                 break
-        if not improved or gained < 0.001 * cost:
+        if not improved:
+            if all(where == point for where in at.values()):
+                break
+            at.clear()  # old columns may be to blame
+        elif gained < 0.001 * cost:
             break
     information = J.T @ J
     covariance = np.linalg.pinv(information + 1e-12 * np.trace(information) / len(J.T) * np.eye(len(J.T)))

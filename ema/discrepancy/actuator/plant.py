@@ -21,6 +21,7 @@ from .cycles import Measured
 from .features import Array, Signals, features, floors, slices, stacked
 
 Point = Mapping[str, float]
+STEPS = (1e-6, 8e-7)  # [s] integration steps of a mean
 CHUNK = 64  # runs in memory at a time
 ENVELOPE_STEP = 10  # the envelope is low-passed at 200 Hz: every tenth sample says all
 
@@ -60,8 +61,26 @@ class EmaPlant:
         declared = self.plant.effects.get(effect, {})
         return float(declared.get(parameter, registry()[effect].neutral()[parameter]))
 
-    def simulate(self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int]) -> Runs:
-        """One run for each (point, cycle, seed), given as three sequences of one length; cycles of one motion."""
+    def simulate(
+        self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], steps: Sequence[float] = STEPS
+    ) -> Runs:
+        """One run for each (point, cycle, seed), given as three sequences of one length; cycles of one motion.
+
+        Integration steps take turns with the seeds: what is rounded alike in every run with one step averages out.
+        """
+        of = np.array([(seed - seeds[0]) % len(steps) for seed in seeds])
+        which = [np.flatnonzero(of == j).tolist() for j in range(len(steps))]
+        parts = [
+            self._simulate([points[r] for r in w], [cycles[r] for r in w], [seeds[r] for r in w], dt)
+            for w, dt in zip(which, steps, strict=True)
+            if w
+        ]
+        back = np.argsort(np.concatenate([w for w in which if w]), kind="stable")
+        return Runs(
+            np.concatenate([p.features for p in parts])[back], np.concatenate([p.envelopes for p in parts])[back]
+        )
+
+    def _simulate(self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], dt: float) -> Runs:
         d, n = self.data, len(points)
         command = d.commands[d.motion[cycles[0]]]
         k = np.array([[point.get(name, 0.0) for name in FAULTS] for point in points])
@@ -85,6 +104,7 @@ class EmaPlant:
                 start=start[part],
                 effects={e: {p: x[part] for p, x in values.items()} for e, values in effects.items()},
                 dT=d.dT[cycles_[part]],
+                dt=dt,
                 n_threads=self.n_threads,
             )
             theta_m = r.theta_m
@@ -97,11 +117,24 @@ class EmaPlant:
         self.n_runs += n
         return Runs(np.concatenate(all_features), np.concatenate(all_envelopes))
 
-    def mean(self, points: Sequence[Point], cycle: int, n_seeds: int, seed: int) -> Array:
+    def means(self, point: Point, cycles: Sequence[int], n_seeds: int, seed: int) -> dict[int, Array]:
+        """Mean features of several cycles at one point, by cycle; each has its own seeds."""
+        found: dict[int, Array] = {}
+        for motion in sorted({int(self.data.motion[c]) for c in cycles}):
+            same = [c for c in cycles if self.data.motion[c] == motion]
+            of = [c for c in same for _ in range(n_seeds)]
+            seeds = [seed + 1000 * c + j for c in same for j in range(n_seeds)]
+            runs = self.simulate([point] * len(of), of, seeds)
+            found |= dict(zip(same, runs.features.reshape(len(same), n_seeds, -1).mean(axis=1), strict=True))
+        return found
+
+    def mean(
+        self, points: Sequence[Point], cycle: int, n_seeds: int, seed: int, steps: Sequence[float] = STEPS
+    ) -> Array:
         """Mean features of a cycle at several points, (n_points, n_features). All points share their seeds."""
         grid = [point for point in points for _ in range(n_seeds)]
         seeds = [seed + j for _ in points for j in range(n_seeds)]
-        runs = self.simulate(grid, [cycle] * len(grid), seeds)
+        runs = self.simulate(grid, [cycle] * len(grid), seeds, steps)
         return runs.features.reshape(len(points), n_seeds, -1).mean(axis=1)
 
     def _effects(self, points: Sequence[Point]) -> dict[str, dict[str, Array]]:

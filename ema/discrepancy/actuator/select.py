@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,10 +35,11 @@ N_FINAL = 16  # seeds of a mean that is judged
 FINAL_SEED = 3_000_000
 N_GLANCE = 4  # seeds that tell a good start from a bad one
 N_PROBE = 8  # seeds of a column that only screens
+DT_PROBE = 2e-6  # [s] step of a simulation that only screens: its columns are within 4 % (12 % for dead time)
 N_REFINED = 4
 WORTH_A_FIT = 0.9  # share of the squared residual a candidate may leave, to first order
 N_REFINED_AT_LEAST = 2
-LOOKS_LIKE_FAULTS = 0.7  # share of an effect's columns outside what faults can do; 0.1 for flux, but for their noise
+NO_WORSE = 1.5  # times the squared residual of the best start, from which a start with fewer faults is not preferred
 K_SEEN = 0.01  # a fault that is there
 NEAR_NOISE = 0.05  # excess below which a fit need not go on
 MAX_EFFECTS = 3
@@ -123,7 +124,7 @@ class Search:
         new = [c for c in found if (0, c.key + "/0") not in self.columns]
         points = [p for c in new for p in c.probes()]
         for motion in range(self.plant.n_motions if new else 0):
-            means = self.plant.mean([{}, *points], self.plant.first[motion], N_PROBE, SEED)
+            means = self.plant.mean([{}, *points], self.plant.first[motion], N_PROBE, SEED, (DT_PROBE,))
             rows = iter(means[1:] - means[0])
             for c in new:
                 for j, amount in enumerate(c.amounts):
@@ -136,7 +137,6 @@ class Search:
         own = stacked_jacobian(self.noise, f.free, f.columns, self.train)
         r = np.concatenate([f.residuals[c] for c in self.train])
         low, high = bounds(f.free, f.point)
-        Q = np.linalg.qr(own[:, [j for j, p in enumerate(f.free) if p.name in FAULTS]])[0]
         ranked = []
         for c in found:
             J = self._columns(c)
@@ -145,8 +145,7 @@ class Search:
                 np.concatenate([own, J], axis=1), r, np.concatenate([low, c_low]), np.concatenate([high, c_high])
             )
             start = {**moved(f.point, f.free, step[: len(f.free)]), **c.start(step[len(f.free) :])}
-            outside = float(np.linalg.norm(J - Q @ (Q.T @ J))) / max(float(np.linalg.norm(J)), 1e-300)
-            ranked.append(Screened(promised, c, start, outside))
+            ranked.append(Screened(promised, c, start))
         return sorted(ranked, key=lambda entry: entry.promised)
 
     def owed_to_last(self, model: Model) -> float:
@@ -171,59 +170,83 @@ class Search:
         found = [c for c in candidates(self.plant.data, self.torques(model)) if c.effect not in model.names]
         refined: dict[str, Model] = {}
         cost = sum(float(r @ r) for r in model.fit.residuals.values())
-        screened = self.screen(model, found)
-        for s in screened:
-            # One effect for several faults is the simpler cause, but noise in the columns would leave the faults there.
-            faults = registry()[s.candidate.effect].mistaken_for
-            seen = len(faults) > 1 and all(model.fit.point.get(name, 0.0) > K_SEEN for name in faults)
-            if seen and s.outside < LOOKS_LIKE_FAULTS and s.candidate.effect not in refined:
-                start = self.start_without(model, s.candidate, faults)
-                refined[s.candidate.effect] = self._refined(model, s, [start], 4)
-        for s in screened:
+        for s in self.screen(model, found):
             if refined and s.promised > WORTH_A_FIT * cost:
                 break
             if len(refined) >= N_REFINED or (len(refined) >= N_REFINED_AT_LEAST and self._clear(refined, s.promised)):
                 break
             if s.candidate.effect not in refined:
-                starts = [s.start, self.start_without(model, s.candidate, FAULTS)]
-                refined[s.candidate.effect] = self._refined(model, s, starts, 2)
-        ranked = sorted(refined.values(), key=lambda m: m.heldout)
-        for m in ranked[:2]:
-            if m.excess < 2.0 * ranked[0].excess + 0.1 and m.excess > NEAR_NOISE:
-                refined[m.names[-1]] = self.model(m.effects, m.fit.free, m.fit.point, None, 4)
+                refined[s.candidate.effect] = self._refined(model, s)
+        for name, m in self._close(refined, NEAR_NOISE):
+            refined[name] = self.model(m.effects, m.fit.free, m.fit.point, None, 4)
+        for name, m in self._close(
+            refined, 0.0
+        ):  # a rival is out only if it leaves more when fitted as well as the best
+            again = self.model(m.effects, m.fit.free, m.fit.point, None, 3)
+            refined[name] = min(m, again, key=lambda x: x.heldout)
         return sorted(refined.values(), key=lambda m: m.heldout)
 
-    def _refined(self, model: Model, s: Screened, starts: Sequence[Point], n_iterations: int) -> Model:
+    def instead_of_faults(self, model: Model) -> list[Model]:
+        """Models in which one effect stands for what several faults have in common, and at least two of them vanish.
+
+        A weaker magnet and three equal shorts are the same torque at the same current; the fewer causes, the likelier.
+        """
+        k = model.fit.point
+        found = []
+        for c in candidates(self.plant.data, []):
+            faults = [name for name in registry()[c.effect].mistaken_for if name in FAULTS]
+            common = min((k.get(name, 0.0) for name in faults), default=0.0)
+            gone = [name for name in faults if k.get(name, 0.0) - common < K_SEEN]
+            if c.effect in model.names or len(c.linear) > 1 or common < K_SEEN or len(gone) < 2:
+                continue
+            self.probe([c])
+            rest = {name: 0.0 if name in gone else k[name] - common for name in faults}
+            less = Model(model.effects, replace(model.fit, point={**k, **rest}), model.heldout)
+            start = self.start_without(less, c, gone)
+            frees = tuple(f for f in model.fit.free if f.name not in gone)
+            found.append(self.model((*model.effects, c), (*frees, *c.frees), start, model.fit.columns, 3))
+        return sorted(found, key=lambda m: m.heldout)
+
+    def _close(self, refined: dict[str, Model], above: float) -> list[tuple[str, Model]]:
+        """The models near the best, and none if the best stands alone and leaves less than `above`."""
+        ranked = sorted(refined.items(), key=lambda item: item[1].heldout)
+        best = ranked[0][1]
+        near = [(name, m) for name, m in ranked[:3] if m.excess < 2.0 * best.excess + 0.2]
+        return near if (len(near) > 1 if above == 0.0 else best.excess > above) else []
+
+    def _refined(self, model: Model, s: Screened) -> Model:
         frees = (*model.fit.free, *s.candidate.frees)
-        start = self._better(starts)
-        return self.model((*model.effects, s.candidate), frees, start, model.fit.columns, n_iterations)
+        starts = [s.start, self.start_without(model, s.candidate, FAULTS)]
+        start, cost = self._better(starts)
+        faults = [name for name in registry()[s.candidate.effect].mistaken_for if name in FAULTS]
+        if len(faults) > 1 and all(model.fit.point.get(name, 0.0) > K_SEEN for name in faults):
+            # One effect for several faults is the simpler cause; noise in the columns would leave the faults there.
+            simpler, simpler_cost = self._better([self.start_without(model, s.candidate, faults)])
+            if simpler_cost < NO_WORSE * cost:
+                start = simpler
+        return self.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3)
 
     def _clear(self, refined: dict[str, Model], promised: float) -> bool:
         """Whether what is left to try promises far less than what was reached."""
         n = sum(len(self.plant.data.y[c]) for c in self.train)
         return promised / n > 3.0 * min(m.fit.misfit for m in refined.values()) + 0.5
 
-    def _better(self, starts: Sequence[Point]) -> Point:
-        """The start that simulates closer to the training cycles."""
-
-        if len(starts) == 1:
-            return starts[0]
+    def _better(self, starts: Sequence[Point]) -> tuple[Point, float]:
+        """The start that simulates closest to the training cycles, and its squared residual."""
 
         def cost(point: Point) -> float:
             left = residuals(self.plant, self.noise, point, self.train, N_GLANCE)
             return sum(float(r @ r) for r in left.values())
 
-        return min(starts, key=cost)
+        return min(((point, cost(point)) for point in starts), key=lambda entry: entry[1])
 
 
 class Screened(NamedTuple):
-    """A candidate's promise: squared residual on training cycles to first order, where to begin a fit, and which share
-    of its columns lies outside what faults can do."""
+    """A candidate's promise: squared residual on training cycles to first order, and where to begin a fit."""
 
     promised: float
     candidate: Candidate
     start: Point
-    outside: float
 
 
 def start_model(search: Search) -> Model:
