@@ -1,13 +1,13 @@
 """Prognosis on simulated growth histories: does the interval hold what it promises, and when is nothing told?
 
-python -m benchmarks.prognosis [N]
+python -m benchmarks.prognosis [N [N_PROGPY]]
 """
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ THRESHOLD = 0.3
 LIFE = 1e6  # from the beginning of a history to the crossing [s]
 FAMILIES = ("linear", "exponential", "power", "Paris", "gamma process", "two slopes")
 NEVER = ("healthy", "settling")
+Method = Callable[[Trend, float, np.random.Generator], Prognosis]
 
 
 class History(NamedTuple):
@@ -81,10 +82,15 @@ class Told(NamedTuple):
         return float(np.mean(self.prognosis.draws <= self.history.life))
 
 
-def run(count: int, seed: int, families: tuple[str, ...] = FAMILIES) -> list[Told]:
-    """The prognosis of every history."""
+def run(
+    count: int, seed: int, families: tuple[str, ...] = FAMILIES, method: Method = prognosis
+) -> tuple[list[Told], float]:
+    """The prognosis of every history, and the CPU time of one [ms]."""
     rng = np.random.default_rng(seed + 1)
-    return [Told(h, prognosis(h.trend, THRESHOLD, rng)) for h in histories(count, seed, families)]
+    made = list(histories(count, seed, families))
+    began = time.process_time()
+    told = [Told(h, method(h.trend, THRESHOLD, rng)) for h in made]
+    return told, 1e3 * (time.process_time() - began) / count
 
 
 def coverage(told: list[Told], share: float) -> float:
@@ -93,34 +99,52 @@ def coverage(told: list[Told], share: float) -> float:
     return float(np.mean(np.abs(levels - 0.5) <= share / 2))
 
 
-def rows(count: int = 600) -> list[dict[str, Any]]:
-    """The bench's table."""
-    began = time.process_time()
-    told = run(count, SEED)
-    ms = 1e3 * (time.process_time() - began) / count
-    never = run(count // 3, SEED, NEVER)
+def scores(count: int, method: Method = prognosis) -> dict[str, tuple[float, float | None, str]]:
+    """Figures of one method on `count` histories that grow and a third as many that never fail: value, ideal, unit."""
+    told, ms = run(count, SEED, method=method)
+    never, _ = run(count // 3, SEED, NEVER, method)
     spoken = [one for one in told if not one.prognosis.silent]
     error = [abs(one.prognosis.life[1] / one.history.life - 1.0) for one in spoken]
     width = [(one.prognosis.life[2] - one.prognosis.life[0]) / one.history.life for one in spoken]
-    found = [("prognosis: coverage of the 50 % interval", coverage(told, 0.5), 0.5, "1")]
-    found += [("prognosis: coverage of the 90 % interval", coverage(told, 0.9), 0.9, "1")]
-    for family in FAMILIES:
-        own = [one for one in told if one.history.family == family]
-        found.append((f"  coverage of the 90 % interval, {family}", coverage(own, 0.9), 0.9, "1"))
-    found += [
-        ("prognosis: growing faults told of", len(spoken) / count, None, "1"),
-        ("prognosis: faults that never fail told of", np.mean([not o.prognosis.silent for o in never]), 0.0, "1"),
-        ("prognosis: median error of the median life", np.median(error), None, "1"),
-        ("prognosis: median width of the 90 % interval in lives", np.median(width), None, "1"),
-        ("prognosis: time", ms, None, "ms of CPU"),
+    families = {
+        f"  coverage of the 90 % interval, {family}": (
+            coverage([one for one in told if one.history.family == family], 0.9), 0.9, "1",
+        )
+        for family in FAMILIES
+    }  # fmt: skip
+    return {
+        "coverage of the 50 % interval": (coverage(told, 0.5), 0.5, "1"),
+        "coverage of the 90 % interval": (coverage(told, 0.9), 0.9, "1"),
+        **families,
+        "growing faults told of": (len(spoken) / count, None, "1"),
+        "faults that never fail told of": (float(np.mean([not o.prognosis.silent for o in never])), 0.0, "1"),
+        "median error of the median life": (float(np.median(error)), None, "1"),
+        "median width of the 90 % interval in lives": (float(np.median(width)), None, "1"),
+        "time": (ms, None, "ms of CPU"),
+    }
+
+
+def rows(count: int = 600, n_peer: int = 120) -> list[dict[str, Any]]:
+    """The bench's table: all histories, then the first `n_peer` of them beside ProgPy, if it is installed."""
+    found = [_row(f"prognosis: {figure}", *score) for figure, score in scores(count).items()]
+    try:
+        from . import _progpy
+    except ImportError:
+        return [*found, _row("prognosis beside ProgPy: needs pip install 'ema-monitor[peers]'", np.nan, None, "")]
+    own, peer = scores(n_peer), scores(n_peer, _progpy.prognosis)
+    return found + [
+        _row(f"prognosis, {n_peer} of them: {figure.strip()}", *own[figure])
+        | {"peer": "ProgPy", "peer_value": round(peer[figure][0], 3)}
+        for figure in own
     ]
-    return [
-        {"figure": figure, "value": round(float(value), 3), "unit": unit, "limit": limit, "seed": SEED}
-        for figure, value, limit, unit in found
-    ]
+
+
+def _row(figure: str, value: float, ideal: float | None, unit: str) -> dict[str, Any]:
+    return {"figure": figure, "value": round(value, 3), "unit": unit, "limit": ideal, "seed": SEED}
 
 
 if __name__ == "__main__":
-    for row in rows(*(int(text) for text in sys.argv[1:2])):
+    for row in rows(*(int(text) for text in sys.argv[1:3])):
         limit = "" if row["limit"] is None else f"   (ideal {row['limit']})"
-        print(f"{row['figure']:<60} {row['value']:8.3f} {row['unit']}{limit}")
+        peer = f"   {row['peer']} {row['peer_value']:.3f}" if "peer" in row else ""
+        print(f"{row['figure']:<80} {row['value']:8.3f} {row['unit']}{limit}{peer}")

@@ -65,7 +65,7 @@ def test_too_few_or_useless_estimates():
 @pytest.mark.slow
 def test_intervals_hold_what_they_promise():
     """A binomial share of about 150 told histories: three standard deviations."""
-    told = bench.run(210, seed=77)
+    told, _ = bench.run(210, seed=77)
     n = sum(not one.prognosis.silent for one in told)
     print(f"{n} of 210 told, coverage 50 %: {bench.coverage(told, 0.5):.3f}, 90 %: {bench.coverage(told, 0.9):.3f}")
     assert n > 100
@@ -75,5 +75,5 @@ def test_intervals_hold_what_they_promise():
 
 @pytest.mark.slow
 def test_what_never_fails_is_hardly_ever_given_a_life():
-    told = bench.run(60, seed=78, families=bench.NEVER)
+    told, _ = bench.run(60, seed=78, families=bench.NEVER)
     assert sum(not one.prognosis.silent for one in told) <= 4

@@ -40,9 +40,9 @@ def _estimate(frame, actuator, cycle, k, status=Status.VALID, reason=0, name="Es
     return frame(name, actuator, status=int(status), reason=int(reason), **values)
 
 
-def _text(state, now_ns=T0):
-    console = Console(width=200, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
-    console.print(draw(state, "bus vcan0", now_ns))
+def _text(state, now_ns=T0, width=200, height=50):
+    console = Console(width=width, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
+    console.print(draw(state, "bus vcan0", now_ns, width, height))
     console.file.close()
     return console.export_text()
 
@@ -55,6 +55,23 @@ def test_estimates_cycles_heartbeat_and_losses_are_shown(frame):
     for part in ("0.150 ±0.010", "0.050 ±0.010", "17", "valid", "daemon running, up 5 s", "lost 2", "cycles 18"):
         assert part in text, part
     assert "█" * 8 + "░" in text  # half a bar for k1
+
+
+@pytest.mark.parametrize(("width", "height", "n"), [(200, 50, 2), (80, 24, 2), (80, 24, 16), (60, 20, 2)])
+def test_a_window_of_any_size_shows_who_when_how_and_all_six(frame, width, height, n):
+    state = Live(codecs.default())
+    for number in range(n):
+        state.update(_estimate(frame, number, 1700 + number, [0.123, 0.234, 0.345, 0.456, 0.567, 0.678]))
+    state.update(frame("Heartbeat", state=1, uptime=5))
+    lines = _text(state, width=width, height=height).splitlines()
+    assert len(lines) <= height
+    assert max(map(len, lines)) <= width
+    text = "\n".join(lines)
+    assert "…" not in text
+    for number in range(n):
+        assert str(1700 + number) in text
+    for part in ("linear", "valid", "daemon running", "0.123", "0.234", "0.345", "0.456", "0.567", "0.678"):
+        assert part in text, part
 
 
 def test_changes_become_events(frame):
