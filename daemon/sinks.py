@@ -11,6 +11,7 @@ from ema.bus.codec import Codec
 from ema.bus.port import Port
 from ema.bus.protection import Sender
 from ema.core.status import ServiceState
+from ema.identification import NuisanceEstimate
 from ema.log import LogWriter, contents
 from ema.monitor import Event, Identified, Level, SampledEnvelope
 
@@ -40,6 +41,24 @@ class BusSink:
             "residual": _NO_LIMIT if residual is None else residual,
         }
         self._send(f"Estimate{e.method.capitalize()}", out.actuator, values, out.t_ns)
+        if e.nuisance is not None:
+            self._nuisance(out, e.nuisance)
+
+    def _nuisance(self, out: Identified, beside: NuisanceEstimate) -> None:
+        """One frame for each parameter estimated beside the faults; what the DBC has no number for is only logged."""
+        fields = self._codec.messages["EstimateNuisance"].fields
+        methods, parameters = ({name: n for n, name in fields[f].names.items()} for f in ("method", "parameter"))
+        known = np.array([name in parameters for name in beside.names])
+        if known.any():
+            low, high = beside.interval95[known].T
+            values = {
+                "cycle": out.cycle,
+                "method": methods[out.estimate.method],
+                "status": int(out.estimate.status),
+                "parameter": np.array([parameters[name] for name in beside.names if name in parameters]),
+                **{"value": beside.value[known], "sd": beside.sd[known], "low": low, "high": high},
+            }
+            self._send("EstimateNuisance", out.actuator, values, out.t_ns)
 
     def heartbeat(self, values: dict[str, Any], t_ns: int) -> None:
         """The sign of life."""
@@ -58,6 +77,8 @@ class LogSink:
     def estimate(self, out: Identified) -> None:
         """One message for each estimate."""
         self._log.estimate(contents.estimate(out.t_ns, out.actuator, out.cycle, out.estimate))
+        for content in contents.nuisance(out.t_ns, out.actuator, out.cycle, out.estimate):
+            self._log.nuisance(content)
 
     def envelope(self, out: SampledEnvelope) -> None:
         """Envelope at the schedule."""

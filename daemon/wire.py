@@ -13,12 +13,13 @@ import numpy as np
 from ema.bundle import Bundle
 from ema.core.config import digest
 from ema.core.status import Reason, Status
-from ema.identification import Estimate, Measurement
+from ema.identification import Estimate, Measurement, NuisanceEstimate
 from ema.monitor import Job
 
 MAX_LINE = 1 << 20  # [B]
 _ARRAYS = ("k", "sd", "covariance", "residual")
 _NUMBERS = ("chi2", "p_value")
+_NUISANCE = ("value", "sd", "covariance", "interval95")  # arrays of a NuisanceEstimate
 
 
 class WireError(Exception):
@@ -71,7 +72,20 @@ def pack_answer(answer: Estimate | Exception) -> bytes:
     content = {name: _plain(getattr(answer, name)) for name in _ARRAYS}
     content |= {name: None if np.isnan(x := getattr(answer, name)) else float(x) for name in _NUMBERS}
     codes = {"dof": int(answer.dof), "status": int(answer.status), "reasons": int(answer.reasons)}
-    return _line({"method": answer.method, **content, **codes})
+    return _line({"method": answer.method, **content, **codes, "nuisance": _pack_nuisance(answer.nuisance)})
+
+
+def _pack_nuisance(beside: NuisanceEstimate | None) -> dict[str, Any] | None:
+    if beside is None:
+        return None
+    numbers = {name: _plain(getattr(beside, name)) for name in _NUISANCE}
+    return {"names": list(beside.names), "units": list(beside.units), **numbers}
+
+
+def _unpack_nuisance(said: dict[str, Any] | None) -> NuisanceEstimate | None:
+    if said is None:
+        return None
+    return NuisanceEstimate(tuple(said["names"]), tuple(said["units"]), *(_array(said[name]) for name in _NUISANCE))
 
 
 def unpack_answer(line: bytes) -> Estimate:
@@ -84,7 +98,8 @@ def unpack_answer(line: bytes) -> Estimate:
         chi2, p_value = (float(_array(said[name])) for name in _NUMBERS)
         status, reasons = Status(said["status"]), Reason(said["reasons"])
         return Estimate(
-            str(said["method"]), k, sd, covariance, chi2, int(said["dof"]), p_value, residual, status, reasons
+            *(str(said["method"]), k, sd, covariance, chi2, int(said["dof"]), p_value, residual, status, reasons),
+            nuisance=_unpack_nuisance(said["nuisance"]),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise WireError("an answer makes no sense") from error

@@ -67,6 +67,28 @@ def trend(actuator: ActuatorHistory, health: Health, settings: ReportSettings) -
         return _svg(figure)
 
 
+def beside(actuator: ActuatorHistory) -> str:
+    """Every parameter estimated beside the faults over time, with two standard deviations."""
+    names = sorted({name for _, name in actuator.beside})
+    with matplotlib.rc_context(_STYLE):
+        figure, axes = plt.subplots(1, len(names), figsize=(10.2, 2.2), layout="constrained", squeeze=False)
+        first_ns = min(one.t_ns[0] for one in actuator.beside.values())
+        last_ns = max(one.t_ns[-1] for one in actuator.beside.values())
+        scale, unit = _time_unit((last_ns - first_ns) / 1e9)
+        for name, ax in zip(names, axes[0], strict=True):
+            for (method, parameter), one in sorted(actuator.beside.items()):
+                if parameter != name:
+                    continue
+                t, value, sd = (np.array(x, float) for x in (one.t_ns, one.value, one.sd))
+                at = (t - first_ns) / 1e9 / scale
+                (drawn,) = ax.plot(at, value, ".-", ms=3, lw=0.8, label=f"{method} ± 2 sd")
+                ax.fill_between(at, value - 2 * sd, value + 2 * sd, color=drawn.get_color(), alpha=0.15, lw=0)
+            ax.set_title(name, loc="left", fontweight="bold")
+            ax.set_xlabel(f"time since the first estimate [{unit}]")
+            ax.legend(fontsize=7, frameon=False)
+        return _svg(figure)
+
+
 def envelope(content: dict[str, Any]) -> str:
     """Envelope of one cycle at the schedule against the model, and the residual in standard deviations."""
     t, measured, model, sd = (_numbers(content[name]) for name in ("t", "measured", "model", "sd"))

@@ -16,9 +16,33 @@ from .report_settings import ReportSettings
 from .series import OperatingTime, Series
 
 _LAST = 200  # events and flagged cycles kept
+_POINTS = 600  # drawn of a parameter beside the faults
 _PLACES = 20  # silences and steps of the clock kept
 _SILENCE = 3.0  # heartbeats come every second [s]
 _CLOCK_STEP = 0.1  # wall clock against uptime [s]
+
+
+@dataclass
+class Beside:
+    """A parameter estimated beside the faults: some of its cycles, evenly, and its latest message."""
+
+    t_ns: list[int] = field(default_factory=list)
+    value: list[float] = field(default_factory=list)
+    sd: list[float] = field(default_factory=list)
+    last: dict[str, Any] = field(default_factory=dict)
+    n: int = 0
+    every: int = 1
+
+    def add(self, content: dict[str, Any]) -> None:
+        """Take one message (`ema.log.schemas.NUISANCE`)."""
+        self.last = content
+        if self.n % self.every == 0:
+            for name in ("t_ns", "value", "sd"):
+                getattr(self, name).append(content[name])
+        self.n += 1
+        if len(self.t_ns) > _POINTS:
+            self.t_ns, self.value, self.sd = self.t_ns[::2], self.value[::2], self.sd[::2]
+            self.every *= 2
 
 
 @dataclass
@@ -26,7 +50,8 @@ class ActuatorHistory:
     """All of one actuator.
 
     `statuses` and `reasons` count the cycles of the first method (linear), `flagged` holds the last of all estimates
-    that are not valid, `last` and `worst` the latest envelope and the one whose estimate has the lowest p-value.
+    that are not valid, `beside` parameters estimated beside the faults by method and name, `last` and `worst` the
+    latest envelope and the one whose estimate has the lowest p-value.
     """
 
     number: int
@@ -35,6 +60,7 @@ class ActuatorHistory:
     statuses: Counter[str] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)
     flagged: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=_LAST))
+    beside: dict[tuple[str, str], Beside] = field(default_factory=dict)
     n_flagged: int = 0
     missing_cycles: int = 0  # numbers left out, restarts not counted
     cycle: int | None = None  # the last one
@@ -73,6 +99,9 @@ def read(log: LogReader, settings: ReportSettings) -> History:
         try:
             if topic.startswith("/estimate/"):
                 _note_estimate(_actuator(history, content, settings), content, settings)
+            elif topic.startswith("/nuisance/"):
+                beside = _actuator(history, content, settings).beside
+                beside.setdefault((content["method"], content["parameter"]), Beside()).add(content)
             elif topic.startswith("/envelope/"):
                 _note_envelope(_actuator(history, content, settings), content)
             elif topic == "/event":

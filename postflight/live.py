@@ -32,6 +32,17 @@ class Shown:
 
 
 @dataclass
+class Beside:
+    """A parameter estimated beside the faults of one actuator by one method; `name` is effect.parameter."""
+
+    name: str
+    value: float
+    sd: float
+    low: float
+    high: float
+
+
+@dataclass
 class Live:
     """State of the bus as heard.
 
@@ -42,6 +53,7 @@ class Live:
 
     codec: Codec
     estimates: dict[tuple[int, str], Shown] = field(default_factory=dict)
+    beside: dict[tuple[int, str, str], Beside] = field(default_factory=dict)  # by actuator, method, parameter
     cycles: dict[int, int] = field(default_factory=dict)  # last cycle number heard of, by actuator
     heartbeat: dict[str, int] = field(default_factory=dict)
     heard_ns: int = 0  # the last heartbeat
@@ -49,7 +61,7 @@ class Live:
     events: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=_EVENTS))
 
     def __post_init__(self) -> None:
-        wanted = [*_ESTIMATES, "Heartbeat", "CycleStart", "CycleEnd"]
+        wanted = [*_ESTIMATES, "EstimateNuisance", "Heartbeat", "CycleStart", "CycleEnd"]
         self._receiver = Receiver(self.codec, wanted)
         self._silent = False
 
@@ -70,6 +82,10 @@ class Live:
                 t_ns, number = int(own["t_ns"][row]), int(identifiers.actuator(own["id"])[row])
                 if message.name in _ESTIMATES:
                     self._estimate(t_ns, number, _ESTIMATES[message.name], one)
+                elif message.name == "EstimateNuisance":
+                    names = {key: message.fields[key].names.get(int(one[key]), "?") for key in ("method", "parameter")}
+                    numbers = (float(one[key]) for key in ("value", "sd", "low", "high"))
+                    self.beside[number, *names.values()] = Beside(names["parameter"], *numbers)  # type: ignore[index]
                 elif message.name == "Heartbeat":
                     self._beat(t_ns, {name: int(value) for name, value in one.items()})
                 elif message.name.startswith("Cycle"):

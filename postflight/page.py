@@ -119,6 +119,7 @@ def _actuator(actuator: ActuatorHistory, now: Health, settings: ReportSettings) 
         "history": actuator,
         "health": now,
         "statuses": [(s.name.lower(), actuator.statuses[s.name.lower()]) for s in Status],
+        "beside": _inline(figures.beside(actuator)) if actuator.beside else "",
         "trend": _inline(figures.trend(actuator, now, settings)),
         "envelopes": [{"caption": text, "src": _inline(figures.envelope(content))} for text, content in envelopes],
     }

@@ -78,8 +78,12 @@ def draw(state: Live, bus: str, now_ns: int, width: int, height: int) -> Any:
     from rich.text import Text
 
     lines: list[Any] = [Text(bus, "bold"), _beat(state), Text("")]
+    beside = [
+        f"actuator {n}, {by}: {one.name} = {one.value:.4g} ± {one.sd:.2g} (95 %: {one.low:.4g} … {one.high:.4g})"
+        for (n, by, _), one in sorted(state.beside.items())
+    ]
     if state.estimates:
-        room = height - len(lines) - -(-len(_words(state)) // width) - 2
+        room = height - len(lines) - len(beside) - -(-len(_words(state)) // width) - 2
         if width >= _WIDE and 2 * len(state.estimates) < room:
             lines.append(_rows(state, now_ns, _LONGEST))
         elif 3 * len(state.estimates) < room and width >= 60:
@@ -91,6 +95,8 @@ def draw(state: Live, bus: str, now_ns: int, width: int, height: int) -> Any:
     if not state.estimates and not state.cycles:
         lines.append(Text("nothing heard of an actuator yet", "bright_black"))
     lines.append(Text(""))
+    if beside:
+        lines += [Text("beside the faults", "bold"), *(Text(text) for text in beside), Text("")]
     lines += [Text(f"{time.strftime('%H:%M:%S', time.localtime(t // 10**9))}  {text}") for t, text in state.events]
     return Group(*lines)
 

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +40,7 @@ class Field(NamedTuple):
     raw_min: float
     raw_max: float
     unit: str
+    names: Mapping[int, str] = MappingProxyType({})  # of values that stand for something
 
     @property
     def is_count(self) -> bool:
@@ -212,7 +214,8 @@ def _field(s: Any, m: Any, path: Path) -> Field:
     limits = np.finfo(dtype) if kind == "f" else np.iinfo(dtype)
     low = limits.min if s.minimum is None else max(limits.min, round((s.minimum - offset) / scale))
     high = limits.max if s.maximum is None else min(limits.max, round((s.maximum - offset) / scale))
-    return Field(s.name, dtype, bit // 8, 0, 0, scale, offset, low, high, s.unit or "")
+    names = {int(number): str(name) for number, name in (s.choices or {}).items()}
+    return Field(s.name, dtype, bit // 8, 0, 0, scale, offset, low, high, s.unit or "", MappingProxyType(names))
 
 
 def _series(name: str, members: list[Field]) -> Field | None:

@@ -13,11 +13,12 @@ from ema.core.errors import ConfigError
 
 from .estimate import Estimate
 from .measurement import Measurement
+from .nuisance import NuisanceEstimate
 
 if TYPE_CHECKING:
     from ema.bundle import Bundle
 
-__all__ = ["METHODS", "Estimate", "Identifier", "Measurement", "identifier"]
+__all__ = ["METHODS", "Estimate", "Identifier", "Measurement", "NuisanceEstimate", "identifier"]
 
 # Where each identifier is made, by a function `make(bundle)`; imported on demand, since some need a JIT.
 METHODS = {

@@ -10,6 +10,21 @@ import numpy as np
 from ema.core.status import LogState, Reason, ServiceState, Status
 
 
+class NuisanceLike(Protocol):
+    """What is logged of parameters estimated beside the faults (`ema.identification.nuisance.NuisanceEstimate`)."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...  # noqa: D102
+    @property
+    def units(self) -> tuple[str, ...]: ...  # noqa: D102
+    @property
+    def value(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def sd(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def interval95(self) -> np.ndarray: ...  # noqa: D102
+
+
 class EstimateLike(Protocol):
     """What is logged of an estimate (`ema.identification.estimate.Estimate`)."""
 
@@ -27,6 +42,8 @@ class EstimateLike(Protocol):
     def status(self) -> Status: ...  # noqa: D102
     @property
     def reasons(self) -> Reason: ...  # noqa: D102
+    @property
+    def nuisance(self) -> NuisanceLike | None: ...  # noqa: D102
 
 
 def estimate(t_ns: int, actuator: int, cycle: int, result: EstimateLike) -> dict[str, Any]:
@@ -43,6 +60,30 @@ def estimate(t_ns: int, actuator: int, cycle: int, result: EstimateLike) -> dict
         "p_value": float(result.p_value),
         "residual": rms(result.residual),
     }
+
+
+def nuisance(t_ns: int, actuator: int, cycle: int, result: EstimateLike) -> list[dict[str, Any]]:
+    """Contents of `schemas.NUISANCE`, one for each parameter estimated beside the faults."""
+    beside = result.nuisance
+    if beside is None:
+        return []
+    columns = zip(beside.names, beside.units, beside.value, beside.sd, beside.interval95, strict=True)
+    return [
+        {
+            "t_ns": int(t_ns),
+            "actuator": int(actuator),
+            "method": result.method,
+            "cycle": int(cycle),
+            "status": Status(result.status).name.lower(),
+            "parameter": name,
+            "unit": unit,
+            "value": float(value),
+            "sd": float(sd),
+            "low": float(low),
+            "high": float(high),
+        }
+        for name, unit, value, sd, (low, high) in columns
+    ]
 
 
 def rms(residual: np.ndarray) -> float | None:

@@ -123,6 +123,25 @@ ESTIMATE = Kind(
     },
 )
 
+NUISANCE = Kind(
+    "ema.Nuisance",
+    "/nuisance/{actuator}/{method}",
+    "A parameter of the model estimated beside the faults of one cycle; it is no fault.",
+    {
+        "t_ns": _T_NS,
+        "actuator": _ACTUATOR,
+        "method": _choice("identifier", list(METHODS)),
+        "cycle": _CYCLE,
+        "status": _choice("how far the estimate can be trusted", [s.name.lower() for s in Status]),
+        "parameter": {"type": "string", "description": "effect.parameter"},
+        "unit": {"type": "string", "description": "of value, sd and limits; 1 without dimension"},
+        "value": _number("estimate"),
+        "sd": _number("standard deviation", minimum=0),
+        "low": _number("lower limit of the interval of 95 %"),
+        "high": _number("upper limit of the interval of 95 %"),
+    },
+)
+
 ENVELOPE = Kind(
     "ema.Envelope",
     "/envelope/{actuator}",
@@ -169,7 +188,7 @@ STATUS = Kind(
     },
 )
 
-KINDS = (FRAMES, ESTIMATE, ENVELOPE, EVENT, STATUS)
+KINDS = (FRAMES, ESTIMATE, NUISANCE, ENVELOPE, EVENT, STATUS)
 
 
 def to_json(content: dict[str, Any]) -> bytes:

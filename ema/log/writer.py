@@ -109,6 +109,10 @@ class LogWriter:
         """Log one estimate (`schemas.ESTIMATE`)."""
         self._message(schemas.ESTIMATE, content)
 
+    def nuisance(self, content: dict[str, Any]) -> None:
+        """Log one parameter estimated beside the faults (`schemas.NUISANCE`)."""
+        self._message(schemas.NUISANCE, content)
+
     def envelope(self, content: dict[str, Any]) -> None:
         """Log one envelope at the schedule (`schemas.ENVELOPE`)."""
         self._message(schemas.ENVELOPE, content)

@@ -37,7 +37,10 @@ def test_what_is_encoded_is_decoded(codec, name):
     values = {}
     for key, field in message.fields.items():
         shape = (5, field.n_values) if field.n_values else (5,)
-        raw = rng.integers(int(field.raw_min), int(field.raw_max), shape, dtype=field.dtype.newbyteorder("="))
+        if field.dtype.kind == "f":
+            raw = rng.standard_normal(shape).astype(field.dtype.newbyteorder("="))
+        else:
+            raw = rng.integers(int(field.raw_min), int(field.raw_max), shape, dtype=field.dtype.newbyteorder("="))
         values[key] = raw if field.is_count else raw * field.scale + field.offset
     frames = codec.encode(name, 63, values, t_ns=np.arange(5))
     assert codec.find(int(frames["id"][0])) is message

@@ -11,6 +11,7 @@ from ema.bus import identifiers
 from ema.bus.header import HEADER_SIGNALS
 from ema.core import resources
 from ema.core.status import LogState, Reason, ServiceState, Status
+from ema.effects import registry
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +71,12 @@ def test_heartbeat_states_are_those_of_the_library(database):
     heartbeat = database.get_message_by_name("Heartbeat")
     assert choices(heartbeat, "state") == meaning(ServiceState)
     assert choices(heartbeat, "log_state") == meaning(LogState)
+
+
+def test_every_parameter_of_an_effect_has_a_number_and_units_are_si(database):
+    listed = choices(database.get_message_by_name("EstimateNuisance"), "parameter").values()
+    known = [f"{e.name}.{p.name}" for e in registry().values() if "ema" in e.plants for p in e.parameters]
+    assert sorted(listed) == sorted(known)
 
 
 def test_status_and_reasons_are_those_of_the_library(database):
