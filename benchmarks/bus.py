@@ -116,7 +116,11 @@ def rows() -> list[dict[str, Any]]:
                 _median(lambda size=size: _check(before, frames, size, codec)),
             )
     own = [message for message in codec.messages.values() if message.sender == "Actuator"]
-    row("actuators in their test motion that fill a bus of 1 and 5 Mbit/s", 1.0 / load(own, 1e6, 5e6), unit="1")
+    one = load(own, 1e6, 5e6), load(own, 1e6, 5e6, worst=True)
+    for what, n in (("six in turns, two at once", 2), ("six at once", 6)):
+        limit = 50.0 if n == 2 else 100.0
+        row(f"bus of 1 and 5 Mbit/s, {what}: its load ({100 * n * one[1]:.0f} % with all stuff bits)",
+            100 * n * one[0], limit, unit="%")  # fmt: skip
     row("frame out: sequence and CRC", _median(lambda: _protect(frames)))
     return found
 

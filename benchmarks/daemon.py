@@ -1,102 +1,141 @@
-"""The daemon in steady state: start-up, latency on the bus, memory, processor.
+"""The daemon as a process beside `ema simulate`: start-up, latency on the bus, frames lost, memory, processor.
 
-    python -m benchmarks.daemon --bundle var/bundle [--actuators 1] [--cycles 20]
+    python -m benchmarks.daemon [--bundle var/bundle] [--actuators 6] [--cycles 20]
 
-A listener of its own hears the actuators and the daemon on the bus; latency is from the last frame of a cycle to the
-linear estimate of that cycle, both by the kernel's receive time. One figure of it means little while others use the
-machine: the load average is printed beside.
+Both on UDP multicast; a listener of its own hears them. Latency is from a cycle's CycleEnd, sent right behind its last
+currents, to its linear estimate, both by the kernel's receive time. It means little while others use the machine: the
+load average is printed beside. Processor time is that of the daemon while cycles are sent.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import signal
-import socket
 import subprocess
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
 
 from ema.bus import codec as codecs
 from ema.bus import identifiers
+from ema.bus.codec import Codec
 from ema.bus.interface import BusSettings, open_bus
+from ema.bus.port import Port
 
-from .rig import EMA, figures
+from .identification import quick_bundle
+from .rig import EMA, Figures, figures
 
-SEED = 3
-N_FRAMES = 564  # of one actuator in a second with one test cycle
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--bundle", type=Path, required=True)
-    parser.add_argument("--actuators", type=int, default=1)
-    parser.add_argument("--cycles", type=int, default=20)
-    options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        run(Path(folder), options.bundle.resolve(), options.actuators, options.cycles)
+SEED = 12
+N_CYCLES = 20
+_PATIENCE = 60.0  # for the start, and for the last estimates [s]
 
 
-def run(folder: Path, bundle: Path, n_actuators: int, n_cycles: int) -> None:
+def rows(bundle: Path | None = None, actuators: tuple[int, ...] = (1, 6), n_cycles: int = N_CYCLES) -> list[dict]:
+    """One run for each number of actuators, a test cycle a second, all at the same time."""
+    path = (bundle or quick_bundle().path).resolve()
+    return [row for n in actuators for row in _rows(_measured(path, n, n_cycles), n, n_cycles)]
+
+
+@dataclass
+class _Seen:
+    """What one run gave."""
+
+    start_up: float  # [s]
+    frames: np.ndarray  # all that was heard from the first cycle on
+    before: Figures
+    after: Figures
+    took: float  # [s]
+
+
+def _measured(bundle: Path, n_actuators: int, n_cycles: int) -> _Seen:
     pid = os.getpid()
     bus = {"interface": "udp_multicast", "channel": f"239.75.{pid % 250}.{pid // 250 % 250}"}
-    numbers = range(n_actuators)
-    (folder / "log").mkdir()
-    daemon_yaml, scenario_yaml = folder / "daemon.yaml", folder / "scenario.yaml"
-    actuators = {n: {"bundle": str(bundle)} for n in numbers}
-    daemon_yaml.write_text(yaml.safe_dump({"bus": bus, "actuators": actuators, "log": {"directory": "log"}}))
-    scenario = {"bus": bus, "n_cycles": n_cycles, "seed": SEED, "actuators": [{"number": n} for n in numbers]}
-    scenario_yaml.write_text(yaml.safe_dump(scenario))
+    with tempfile.TemporaryDirectory(prefix="ema-bench-") as name, open_bus(BusSettings(**bus)) as port:
+        folder = Path(name)
+        (folder / "log").mkdir()
+        actuators = {n: {"bundle": str(bundle)} for n in range(n_actuators)}
+        daemon = {"bus": bus, "actuators": actuators, "log": {"directory": "log"}}
+        scenario = {"bus": bus, "seed": SEED, "n_cycles": n_cycles, "actuators": [{"number": n} for n in actuators]}
+        (folder / "daemon.yaml").write_text(yaml.safe_dump(daemon))
+        (folder / "scenario.yaml").write_text(yaml.safe_dump(scenario))
+        said, began = (folder / "said.txt").open("w"), time.monotonic()
+        service = subprocess.Popen([EMA, "daemon", "--config", folder / "daemon.yaml"], stderr=said)
+        try:
+            _listen(port, service, "Heartbeat", _PATIENCE)
+            start_up = time.monotonic() - began
+            node = subprocess.Popen(
+                [EMA, "simulate", "--scenario", folder / "scenario.yaml"], stderr=subprocess.DEVNULL
+            )
+            try:
+                heard = _listen(port, service, "CycleStart", _PATIENCE)
+                before, then = figures(service.pid), time.monotonic()
+                while node.poll() is None:
+                    heard.append(port.read(0.2))
+                after, took = figures(service.pid), time.monotonic() - then
+                heard += _listen(port, service, "Heartbeat", 3.0)
+            finally:
+                node.kill()
+                node.wait()
+        except RuntimeError as error:
+            raise SystemExit(f"{error}: {(folder / 'said.txt').read_text().strip()}") from error
+        finally:
+            service.terminate()
+            service.wait(_PATIENCE)
+            said.close()
+    return _Seen(start_up, np.concatenate(heard), before, after, took)
+
+
+def _listen(port: Port, service: subprocess.Popen[bytes], until: str, patience: float) -> list[np.ndarray]:
+    """Frames heard up to the first message of a name."""
+    codec, heard, end = codecs.default(), [], time.monotonic() + patience
+    while time.monotonic() < end:
+        heard.append(port.read(0.1))
+        if _of(heard[-1], codec, until).size:
+            return heard
+        if service.poll() is not None:
+            raise RuntimeError("the daemon does not start")
+    raise RuntimeError(f"no {until} within {patience:g} s")
+
+
+def _rows(seen: _Seen, n_actuators: int, n_cycles: int) -> list[dict[str, Any]]:
     codec = codecs.default()
-    heard = []
-    with open_bus(BusSettings(**bus)) as port, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
-        manager.bind(str(folder / "notify"))
-        began = time.time_ns()
-        environment = {**os.environ, "NOTIFY_SOCKET": str(folder / "notify")}
-        with (folder / "said.txt").open("w") as said:
-            daemon = subprocess.Popen([EMA, "daemon", "--config", daemon_yaml], env=environment, stderr=said)
-        first_beat = 0
-        while not first_beat:
-            if daemon.poll() is not None:
-                raise SystemExit(f"the daemon does not start: {(folder / 'said.txt').read_text().strip()}")
-            frames = port.read(1.0)
-            first_beat = int(frames["t_ns"][0]) if frames.size else 0
-        before = figures(daemon.pid), time.monotonic()
-        simulator = subprocess.Popen([EMA, "simulate", "--scenario", scenario_yaml], stderr=subprocess.DEVNULL)
-        began_cycles = None
-        while simulator.poll() is None:
-            frames = port.read(0.2)
-            if began_cycles is None and (codec_id(frames, codec, "CycleStart")).any():
-                began_cycles, before = time.monotonic(), (figures(daemon.pid), time.monotonic())
-            heard.append(frames)
-        after = figures(daemon.pid), time.monotonic()
-        heard.append(port.read(1.0))
-        daemon.send_signal(signal.SIGTERM)
-        status = daemon.wait(30)
-    latency = latencies(np.concatenate(heard), codec)
-    cpu = (after[0].cpu - before[0].cpu) / (after[1] - before[1])
-    print(f"start to first heartbeat   {(first_beat - began) / 1e9:8.2f} s")
-    print(f"cycles answered            {latency.size:8d} of {n_actuators * n_cycles} (seed {SEED})")
-    for name, q in (("median", 50), ("p99", 99), ("largest", 100)):
-        print(f"latency, {name:<10}        {np.percentile(latency, q):8.2f} ms")
-    print(f"memory (RSS)               {after[0].rss / 1e6:8.0f} MB, {after[0].n_threads} threads")
-    print(f"processor for each actuator{100 * cpu / n_actuators:8.1f} % of a core at {N_FRAMES} frames/s")
-    print(f"load average               {os.getloadavg()[0]:8.1f} on {os.cpu_count()} cores; exit status {status}")
+    beat = codec.messages["Heartbeat"].decode(_of(seen.frames, codec, "Heartbeat"))
+    latency = latencies(seen.frames, codec)
+    cpu = (seen.after.cpu - seen.before.cpu) / seen.took
+    load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
+
+    def row(figure: str, value: float, unit: str, limit: float | None = None) -> dict[str, Any]:
+        whose = "one actuator" if n_actuators == 1 else f"{n_actuators} actuators in step"
+        named = {"figure": f"{whose}: {figure}", "value": round(float(value), 3), "unit": unit}
+        return {**named, "limit": limit, "peer": "", "peer_value": None, "seed": SEED}
+
+    return [
+        row("cycles without an estimate", n_actuators * n_cycles - latency.size, "1", 0),
+        row("frames lost, by the heartbeat", beat["n_lost"][-1], "1", 0),
+        row("frames the kernel dropped", beat["kernel_drops"][-1], "1", 0),
+        row("frames on the bus", seen.frames.size / seen.took, "1/s"),
+        row(f"latency of the linear estimate, median ({load})", np.median(latency), "ms"),
+        row("latency of the linear estimate, 99 %", np.percentile(latency, 99), "ms", 10),
+        row("processor for each actuator", 100 * cpu / n_actuators, "% of a core", 10),
+        row(f"resident memory, {seen.after.n_threads} threads", seen.after.rss / 1e6, "MB", 200),
+        row("start to first heartbeat", seen.start_up, "s"),
+    ]
 
 
-def codec_id(frames: np.ndarray, codec: codecs.Codec, name: str) -> np.ndarray:
-    return identifiers.message_id(frames["id"]) == codec.messages[name].frame_id
+def _of(frames: np.ndarray, codec: Codec, name: str) -> np.ndarray:
+    return frames[identifiers.message_id(frames["id"]) == codec.messages[name].frame_id]
 
 
-def latencies(frames: np.ndarray, codec: codecs.Codec) -> np.ndarray:
-    """From CycleEnd, sent right behind a cycle's last currents, to EstimateLinear, of each cycle. [ms]"""
+def latencies(frames: np.ndarray, codec: Codec) -> np.ndarray:
+    """From CycleEnd to EstimateLinear, of each cycle. [ms]"""
     times: dict[str, dict[tuple[int, int], int]] = {}
     for name in ("CycleEnd", "EstimateLinear"):
-        own = frames[codec_id(frames, codec, name)]
+        own = _of(frames, codec, name)
         cycles = codec.messages[name].decode(own)["cycle"].tolist()
         keys = zip(identifiers.actuator(own["id"]).tolist(), cycles, strict=True)
         times[name] = dict(zip(keys, own["t_ns"].tolist(), strict=True))
@@ -105,4 +144,11 @@ def latencies(frames: np.ndarray, codec: codecs.Codec) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bundle", type=Path, help="folder written by `ema build`; default: a quick one, cached")
+    parser.add_argument("--actuators", type=int, nargs="+", default=[1, 6])
+    parser.add_argument("--cycles", type=int, default=N_CYCLES)
+    arguments = parser.parse_args()
+    for found in rows(arguments.bundle, tuple(arguments.actuators), arguments.cycles):
+        limit = "" if found["limit"] is None else f"   (at most {found['limit']})"
+        print(f"{found['figure']:75} {found['value']:10} {found['unit']}{limit}")

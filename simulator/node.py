@@ -71,7 +71,7 @@ def run(
     """
     summary = Summary()
     faults = FaultSource(scenario, codec)
-    traffic = Traffic(codec, [a.number for a in scenario.actuators])
+    traffic = Traffic(codec, [a.number for a in scenario.actuators], scenario.stagger)
     bus_rng = np.random.default_rng([scenario.seed, _SEED_BUS])
     origin: float | None = None  # monotonic time of scenario time 0
     for cycle in cycles(scenario, plant, faults):

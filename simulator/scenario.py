@@ -75,6 +75,7 @@ class Scenario(Settings):
     bus: BusSettings = BusSettings()
     period: float = quantity("s", "from the start of one test cycle to the next", 1.0, gt=0)
     return_time: float = quantity("s", "to go back to zero after the test motion", 0.25, gt=0)
+    stagger: float = quantity("s", "each actuator begins its test motion so much after the one before it", 0.0, ge=0)
     n_cycles: int | None = Field(default=None, ge=1, description="stop after so many cycles; absent: go on")
     rate: float = Field(default=1.0, gt=0, le=1000, description="scenario time over real time")
     seed: int = Field(default=0, ge=0)
@@ -96,10 +97,11 @@ def load(path: str | Path) -> tuple[Scenario, Actuator]:
     scenario = config.load(path, Scenario)
     beside = Path(path).parent / scenario.actuator
     plant = config.load(beside if beside.exists() else resources.config(scenario.actuator), Actuator)
-    least = plant.motion.duration + scenario.return_time
+    least = plant.motion.duration + scenario.return_time + scenario.stagger * (len(scenario.actuators) - 1)
     if scenario.period < least:
         raise ConfigError(
-            f"{path}: key 'period' = {scenario.period:g}: must be at least {least:g} s (test motion and way back)"
+            f"{path}: key 'period' = {scenario.period:g}: must be at least {least:g} s (test motion and way back, "
+            "of the last actuator if they are staggered)"
         )
     for actuator in scenario.actuators:
         _check_effects(actuator.effects, path)

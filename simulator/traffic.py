@@ -19,11 +19,20 @@ _CHIRP = 0
 
 
 class Traffic:
-    """Encodes cycles of several actuators; keeps their running sequence numbers."""
+    """Encodes cycles of several actuators; keeps their running sequence numbers.
 
-    def __init__(self, codec: Codec, numbers: Sequence[int]):
+    Parameters
+    ----------
+    codec : Codec
+    numbers : actuator numbers, one for each lane
+    stagger : float
+        Each lane begins its test motion so much after the one before it. [s]
+    """
+
+    def __init__(self, codec: Codec, numbers: Sequence[int], stagger: float = 0.0):
         self._codec = codec
         self._numbers = numbers
+        self._stagger = stagger
         self._sender = Sender()
 
     def frames(self, cycle: CycleData, period: float) -> tuple[np.ndarray, np.ndarray]:
@@ -49,8 +58,9 @@ class Traffic:
         slow = slice(0, n_times, _MOTION_EVERY)
         n_current = math.ceil(n_times / _PER_FRAME)
         n_motion = math.ceil(math.ceil(n_times / _MOTION_EVERY) / _PER_FRAME)
-        due_current = np.arange(1, n_current + 1) * _PER_FRAME * dt
-        due_motion = np.arange(1, n_motion + 1) * _PER_FRAME * _MOTION_EVERY * dt
+        begin = lane * self._stagger
+        due_current = begin + np.arange(1, n_current + 1) * _PER_FRAME * dt
+        due_motion = begin + np.arange(1, n_motion + 1) * _PER_FRAME * _MOTION_EVERY * dt
         due_motion[-1] = due_current[-1]
         n_supply = round(period / self._codec.messages["Supply"].period)
         due_supply = np.arange(n_supply) * period / max(n_supply, 1)
@@ -71,7 +81,7 @@ class Traffic:
         u_dc = np.interp(due_supply, cycle.t, response.u_dc[lane])
         encode = self._codec.encode
         return [
-            (encode("CycleStart", number, bounds), np.zeros(1)),
+            (encode("CycleStart", number, bounds), np.array([begin])),
             (encode("PhaseCurrents", number, currents), due_current),
             (encode("Motion", number, motion), due_motion),
             (encode("CycleEnd", number, bounds), due_current[-1:]),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
+from ema.core.closing import Closing
 from ema.core.errors import ConfigError
 from ema.core.names import FAULTS
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 COLUMNS = ("cycle", "actuator", "t [s]", *FAULTS, "temp_w [°C]")
 
 
-class TruthFile:
+class TruthFile(Closing):
     """Writes one row for each actuator and cycle, at once readable by others."""
 
     def __init__(self, path: str | Path, numbers: list[int]):
@@ -37,10 +37,6 @@ class TruthFile:
             self._writer.writerow([cycle.number, number, cycle.t_start, *k, temp_w])
         self._file.flush()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Close the file."""
         self._file.close()

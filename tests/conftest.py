@@ -108,7 +108,7 @@ def fly(shipped_plant):
 
 def _flight(scenario, plant):
     shared = codec.default()
-    traffic = Traffic(shared, [a.number for a in scenario.actuators])
+    traffic = Traffic(shared, [a.number for a in scenario.actuators], scenario.stagger)
     rng = np.random.default_rng(scenario.seed)
     for cycle in cycles(scenario, plant, FaultSource(scenario, shared)):
         frames, due = traffic.frames(cycle, scenario.period)

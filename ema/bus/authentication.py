@@ -8,6 +8,7 @@ earlier is refused, also after either side was restarted.
 
 from __future__ import annotations
 
+import os
 import string
 from pathlib import Path
 
@@ -32,13 +33,16 @@ _MAX_WAITING = 4096  # frames
 
 
 def load_key(path: Path) -> bytes:
-    """Key from a file of 32, 48 or 64 hexadecimal digits that nobody but its owner can read; BusError otherwise."""
+    """Key from a file of 32, 48 or 64 hexadecimal digits that nobody but its owner can read; BusError otherwise.
+
+    What systemd hands to a service (LoadCredential=) only that can read, though its mode may look otherwise.
+    """
     try:
         mode, text = path.stat().st_mode, path.read_text(encoding="ascii").strip()
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "not hexadecimal digits"
         raise BusError(f"key file {path}: cannot be read ({why})") from error
-    if mode & 0o077:
+    if mode & 0o077 and Path(os.environ.get("CREDENTIALS_DIRECTORY", os.devnull)) not in path.parents:
         raise BusError(f"key file {path}: others can read it: chmod 600 {path}")
     if len(text) not in (32, 48, 64) or not set(text) <= set(string.hexdigits):
         raise BusError(f"key file {path}: must hold 32, 48 or 64 hexadecimal digits (AES-128, 192 or 256)")

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import socket
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
+from ema.core.closing import Closing
 from ema.core.frames import FrameFlag
 
 MAX_BATCH = 512  # frames read at once
@@ -34,7 +33,7 @@ class PortCounters:
     kernel_drops: int = 0  # the kernel's receive buffer was full
 
 
-class Port(ABC):
+class Port(Closing):
     """An open bus.
 
     Attributes
@@ -71,14 +70,6 @@ class Port(ABC):
         """What happened to the link since the last call, one line each."""
         events, self._events = self._events, []
         return events
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def ask_for_buffer(sock: socket.socket, size: int) -> str | None:

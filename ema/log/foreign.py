@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from ema.core import frames as raw
 from ema.core.can_messages import fill
+from ema.core.closing import Closing
 from ema.core.errors import LogError
 
 from .reader import FrameBatch, Paths, find_logs
@@ -17,7 +17,7 @@ SUFFIXES = (".asc", ".blf", ".csv", ".db", ".log", ".mf4", ".trc")
 _BATCH = 512
 
 
-class ForeignLog:
+class ForeignLog(Closing):
     """Frames of logs that are not ours, as `reader.LogReader.frames` gives them.
 
     Raises
@@ -35,14 +35,6 @@ class ForeignLog:
 
     def close(self) -> None:
         """Nothing is held open between reads."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def first_ns(self) -> int | None:
         """Time of the first frame, None without one. [ns]"""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ema.core.closing import Closing
 from ema.core.errors import LogError
 
 from . import batches, schemas
@@ -33,7 +33,7 @@ class FrameBatch(NamedTuple):
     frames: np.ndarray
 
 
-class LogReader:
+class LogReader(Closing):
     """Reads MCAP logs, unfinished and damaged ones included.
 
     Parameters
@@ -72,14 +72,6 @@ class LogReader:
         """Close all files."""
         for file in self._files:
             file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def first_ns(self) -> int | None:
         """Time of the first message of all, None when there is none. [ns]"""

@@ -8,11 +8,11 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
+from ema.core.closing import Closing
 from ema.core.errors import LogError
 from ema.core.status import LogState
 
@@ -24,7 +24,7 @@ _BACKLOG_LIMIT = 32_000_000  # bytes waiting for the thread; beyond, messages ar
 _logger = logging.getLogger("ema.log")
 
 
-class LogWriter:
+class LogWriter(Closing):
     """Writes frames, estimates, envelopes, events and status to MCAP segments.
 
     Contents are the dictionaries described in `ema.log.schemas`; numpy values and NaN (→ null) are accepted.
@@ -134,14 +134,6 @@ class LogWriter:
             self._wake.notify()
         self._thread.join()
         self._log.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _message(self, kind: schemas.Kind, content: dict[str, Any]) -> None:
         message = kind.encode(content)  # here, so that the caller may go on changing the content

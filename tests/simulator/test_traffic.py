@@ -8,6 +8,7 @@ from ema_simulator.scenario import Disturbances, load
 from ema_simulator.traffic import Traffic
 
 from ema.bus.header import sequence
+from ema.bus.load import frame_time
 from ema.bus.protection import Check, Receiver
 
 
@@ -108,3 +109,18 @@ def test_a_gap_is_in_its_cycle_only(sent):
     assert not ((when >= 0.2) & (when < 0.25)).any()
     assert frames.size - out.size == pytest.approx(2 * 55, abs=3)
     assert disturb(frames, due, 1, gap, np.random.default_rng(1))[0].size == frames.size
+
+
+@pytest.mark.parametrize(("stagger", "period", "at_once"), [(0.0, 1.0, 6), (0.25, 2.0, 2), (0.5, 3.25, 1)])
+def test_staggered_actuators_share_a_bus_that_all_at_once_would_overfill(codec, write, stagger, period, at_once):
+    """Six on a bus of 1 and 5 Mbit/s with as many stuff bits as there can be; docs/bus.md says so."""
+    actuators = ", ".join(f"{{number: {n}}}" for n in range(6))
+    scenario, plant = load(write(f"period: {period} s\nstagger: {stagger} s\nactuators: [{actuators}]"))
+    frames, due = Traffic(codec, range(6), scenario.stagger).frames(
+        Fleet(scenario, plant).next_cycle(np.zeros((6, 6))), scenario.period
+    )
+    assert due.max() < scenario.period
+    busy = np.array([frame_time(int(n), 1e6, 5e6, worst=True) for n in frames["length"]])
+    load_of_50_ms = np.bincount((due / 0.05).astype(int), weights=busy) / 0.05
+    assert (load_of_50_ms.max() < 0.5) == (at_once <= 2)
+    assert (load_of_50_ms.max() > 1.0) == (at_once == 6)

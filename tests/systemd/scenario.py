@@ -6,6 +6,7 @@ saw goes to facts.json; copies of the log directory go to folders named after th
 
 import json
 import os
+import secrets
 import shutil
 import signal
 import subprocess
@@ -30,6 +31,7 @@ def main():
     kill()
     hang()
     take_the_interface_away()
+    lock_the_bus()
     facts["exposure"] = run("systemd-analyze", "security", "--no-pager", DAEMON, check=False).strip().splitlines()[-1]
     (JOB / "journal.txt").write_text(
         run("journalctl", "--no-pager", "-o", "short-monotonic", "-u", DAEMON, "-u", WORKER, "-u", SIMULATOR)
@@ -106,6 +108,29 @@ def take_the_interface_away():
     listen()
     run("systemctl", "start", SIMULATOR)
     facts["estimates_after_interface"] = wait_for_estimates()
+
+
+def lock_the_bus():
+    say("message authentication: a key that only root can read, handed to the service by systemd")
+    key = Path(f"/etc/ema/{BUS}.key")
+    key.write_text(secrets.token_hex(16) + "\n")
+    key.chmod(0o600)
+    drop_in = Path(f"/etc/systemd/system/{DAEMON}.d/key.conf")
+    drop_in.parent.mkdir()
+    drop_in.write_text(f"[Service]\nLoadCredential=key:{key}\n")
+    with Path(f"/etc/ema/{BUS}.yaml").open("a") as config:
+        config.write(f"bus: {{key_file: /run/credentials/{DAEMON}/key}}\n")
+    run("systemctl", "daemon-reload")
+    run("systemctl", "restart", DAEMON)
+    wait("the simulator's frames are refused: it has no key", lambda: "not authentic" in journal())
+    with Path("/etc/ema/scenario.yaml").open("a") as scenario:
+        scenario.write(f"bus: {{key_file: {key}}}\n")
+    run("systemctl", "restart", SIMULATOR)
+    facts["estimates_after_key"] = wait_for_estimates()
+
+
+def journal():
+    return run("journalctl", "--no-pager", "-u", DAEMON, check=False)
 
 
 def listen():

@@ -112,7 +112,7 @@ def test_daemon_is_restarted(facts, machine, event, result):
     assert f"Failed with result '{result}'" in (machine / "journal.txt").read_text()
 
 
-@pytest.mark.parametrize("event", ["kill", "hang", "interface"])
+@pytest.mark.parametrize("event", ["kill", "hang", "interface", "key"])
 def test_estimates_go_on(facts, event):
     assert facts[f"estimates_after_{event}"] >= 2
 
