@@ -56,8 +56,10 @@ def model_error(model: Model, sets: Sets, S: np.ndarray) -> np.ndarray:
 
 
 def spreads(sets: Sets) -> np.ndarray:
-    """Mean spread of few and of many faults, shape (2,)."""
-    return np.array([np.mean([spread(k).mean() for k, _, _ in half]) for half in halves(sets)])
+    """Spread up to which faults count as few and from which as many, shape (2,): the mean of the few, and what nine of
+    ten of the many exceed."""
+    few, many = (np.concatenate([spread(k) for k, _, _ in half]) for half in halves(sets))
+    return np.array([few.mean(), max(float(np.quantile(many, 0.1)), few.mean() + 0.1)])
 
 
 def halves(sets: Sets) -> tuple[Sets, Sets]:

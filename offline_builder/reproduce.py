@@ -65,6 +65,8 @@ def _stages(bench: Any) -> dict[str, Callable[[], dict[str, Any]]]:
     }
     for method in e.METHODS:
         stages[f"identifier {method}"] = lambda method=method: e.identifiers(bench, method)  # type: ignore[misc]
+    for method in e.OTHERS:
+        stages[f"elsewhere {method}"] = lambda method=method: e.elsewhere(bench, method)  # type: ignore[misc]
     return stages
 
 

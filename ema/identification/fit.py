@@ -38,14 +38,10 @@ class Problem(NamedTuple):
     A: np.ndarray
     r: np.ndarray
 
-    def whitener(
-        self, measurement: Measurement, noise: NoiseModel, nuisance: Nuisance, x: np.ndarray, n_own: float = np.inf
-    ) -> Whitener:
-        """Weights for an answer near `x` by a model whose own answers are noisy as means of `n_own` runs are."""
+    def whitener(self, measurement: Measurement, noise: NoiseModel, nuisance: Nuisance, x: np.ndarray) -> Whitener:
+        """Weights for an answer near `x`."""
         v = np.ix_(measurement.valid, measurement.valid)
         covariance = noise.covariance(measurement.start, x)
-        if np.isfinite(n_own):
-            covariance = covariance + noise.switching / n_own
         if len(nuisance):
             return Whitener(covariance[v] + nuisance.untrusted(x, self.A, noise.switching[v]))
         return Whitener(covariance[v])

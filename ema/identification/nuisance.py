@@ -29,7 +29,7 @@ from .truncated import Marginals
 from .weighted import Whitener, bounded_least_squares
 
 if TYPE_CHECKING:
-    from . import Identifier
+    from . import Estimate, Identifier
 
 RULED_OUT = 9.0  # χ² by which another explanation must be worse to be ruled out: three standard deviations
 MATTERS = 0.02  # difference in a fault that an operator would be told of
@@ -112,12 +112,12 @@ class Nuisance:
     def started_by(self, first: Identifier) -> Callable[[Measurement], np.ndarray]:
         """Where an iteration begins: the point x (6 + m,) of another identifier's answer."""
 
-        def start(measurement: Measurement) -> np.ndarray:
-            e = first.estimate(measurement)
-            nu = np.zeros(len(self)) if e.nuisance is None else (e.nuisance.value - self.centre) / self.scale
-            return np.concatenate([e.k, nu])
+        return lambda measurement: self.point(first.estimate(measurement))
 
-        return start
+    def point(self, e: Estimate) -> np.ndarray:
+        """x of an estimate, shape (6 + m,)."""
+        nu = np.zeros(len(self)) if e.nuisance is None else (e.nuisance.value - self.centre) / self.scale
+        return np.concatenate([e.k, nu])
 
     def effects(self, x: np.ndarray, declared: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, Any]]:
         """Effects at points `x` (n, 6 + m) as the HF model takes them; `declared` are the plant's own."""
