@@ -33,13 +33,15 @@ def identify(bundle: Path, method: str, as_json: bool, records: tuple[Path, ...]
     from ema.core.records import read_record
     from ema.core.status import Status
     from ema.identification import identifier
+    from ema.identification.alignment import aligned
     from ema.identification.recorded import measurements, missing
 
     made = ema.bundle.load(bundle)
-    sets = [(record, measurements(record, made.plant, made.schedule)) for record in map(read_record, records)]
+    read = [aligned(read_record(path), made.plant) for path in records]
+    sets = [(record, notes, measurements(record, made.plant, made.schedule)) for record, notes in read]
     estimator = identifier(method, made)
     answers: list[dict[str, Any]] = []
-    for record, measured in sets:
+    for record, notes, measured in sets:
         cycles = [
             _refused(cycle.number, m) if isinstance(m, RecordError) else _answer(cycle.number, estimator.estimate(m))
             for cycle, m in zip(record, measured, strict=True)
@@ -48,6 +50,7 @@ def identify(bundle: Path, method: str, as_json: bool, records: tuple[Path, ...]
             {
                 "record": record.name,
                 "missing_channels": list(missing(record)),
+                "notes": notes,
                 "cycles": cycles,
             }
         )
@@ -103,6 +106,8 @@ def _say(answer: dict[str, Any]) -> None:
     from ema.core.names import FAULTS
 
     click.echo(answer["record"])
+    for note in answer["notes"]:
+        click.echo(f"  {note.removeprefix(answer['record'] + ': ')}")
     if answer["missing_channels"]:
         click.echo(f"  not measured: {', '.join(answer['missing_channels'])}")
     click.echo("  cycle  " + "".join(f"{fault:^17}" for fault in FAULTS) + "  p-value  status")

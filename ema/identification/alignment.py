@@ -11,9 +11,21 @@ with + where the torque is positive.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+
+from ema.core.errors import RecordError
+from ema.core.records import Cycle, Record
+from ema.models.actuator import Actuator
+
+CURRENTS = ("i_a", "i_b", "i_c")
+FOLLOWS = 0.7  # coherence from which the currents say where the rotor's zero is
+SIXTH = np.pi / 3.0  # electrical; by so much the phases' names and signs turn a three-phase motor into itself
+MAX_REST = 0.25  # [rad] electrical, beyond what resolvers are out of adjustment and the method errs (0.12 rad)
+MIN_SAMPLES = 1000
+POLE_PAIRS = range(1, 25)
 
 
 class Alignment(NamedTuple):
@@ -24,6 +36,69 @@ class Alignment(NamedTuple):
     theta_0: float
     reversed_order: bool
     coherence: float
+
+
+def aligned(record: Record, plant: Actuator) -> tuple[Record, list[str]]:
+    """The record with its phases named and signed as the plant's are, and what was changed, in words.
+
+    Exchanged phases, opposite currents and a rotor zero that is a multiple of 60° electrical away are the same motor in
+    other words, and are put right. A record without rotor angle, or whose currents do not tell, is left as it is.
+
+    Raises
+    ------
+    RecordError
+        The rotor zero or the number of pole pairs is another: what would be right.
+    """
+    cycles = [cycle for cycle in record if cycle.n_samples >= MIN_SAMPLES]
+    if not cycles or not {*CURRENTS, "theta_m"} <= set(record.channels):
+        return record, []
+    n = min(cycle.n_samples for cycle in cycles)
+    i = np.array([[cycle[name][:n] for name in CURRENTS] for cycle in cycles])
+    theta_m = np.unwrap(np.array([cycle["theta_m"][:n] for cycle in cycles]), axis=-1)
+    motor, rate = plant.motor, 1.0 / cycles[0].period
+    found = alignment(i, theta_m, motor.p, rate)
+    if found.coherence < FOLLOWS:
+        by_p = {p: alignment(i, theta_m, p, rate).coherence for p in POLE_PAIRS}
+        best = max(by_p, key=lambda p: by_p[p])
+        if best != motor.p and by_p[best] > FOLLOWS:
+            raise RecordError(
+                f"{record.name}: the currents follow the rotor as those of a motor with {best} pole pairs do, "
+                f"'{plant.name}' has motor.p = {motor.p}"
+            )
+        return record, []
+    off = float(np.angle(np.exp(1j * (found.theta_0 - motor.theta_0))))
+    sixths = round(off / SIXTH)
+    rest = off - sixths * SIXTH
+    if abs(rest) > MAX_REST:
+        order = ", and its phases B and C are exchanged" if found.reversed_order else ""
+        raise RecordError(
+            f"{record.name}: the rotor's electrical zero is at {found.theta_0:.2f} rad, '{plant.name}' has "
+            f"motor.theta_0 = {motor.theta_0:g}{order}; set motor.theta_0: {found.theta_0:.2f} rad in the plant file"
+        )
+    return _renamed(record, found.reversed_order, sixths % 6)
+
+
+def _renamed(record: Record, exchanged: bool, sixths: int) -> tuple[Record, list[str]]:
+    """Phases exchanged, turned by so many sixths of a turn: a space vector less 60° is a sign, or the next phase."""
+    order: tuple[int, ...] = (0, 2, 1) if exchanged else (0, 1, 2)
+    opposite, turn = (False, sixths // 2) if sixths % 2 == 0 else (True, ((sixths - 3) % 6) // 2)
+    order = tuple(order[(j + turn) % 3] for j in range(3))
+    if order == (0, 1, 2) and not opposite:
+        return record, []
+    sign = -1.0 if opposite else 1.0
+
+    def renamed(cycle: Cycle) -> Cycle:
+        own = {name: sign * cycle[CURRENTS[j]] for name, j in zip(CURRENTS, order, strict=True)}
+        return replace(cycle, channels={**cycle.channels, **own})
+
+    said = []
+    if order != (0, 1, 2):
+        names = ", ".join(CURRENTS[j] for j in order)
+        said.append(f"its phases in the plant's order are {names} (k3, k4, k5 are these)")
+    if opposite:
+        said.append("its currents have the opposite sign")
+    text = f"{record.name}: {' and '.join(said)}; taken so"
+    return replace(record, cycles=tuple(map(renamed, record.cycles))), [text]
 
 
 def alignment(i_abc: np.ndarray, theta_m: np.ndarray, p: int, rate: float) -> Alignment:

@@ -28,6 +28,7 @@ class Flaws(NamedTuple):
     k4: float = 0.0
     k5: float = 0.0
     k6: float = 0.0
+    phi: float = 0.0  # [rad] direction of the eccentricity
     # motor and inverter
     flux: float = 0.0  # relative change
     resistance: float = 0.0  # relative change
@@ -205,7 +206,7 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
                 + f.commutation
             )
             for j in range(3):
-                kappa[j] = k_e * (1.0 + f.flux) * N[j] * (1.0 + f.k6 * math.cos(theta - shift[j]))
+                kappa[j] = k_e * (1.0 + f.flux) * N[j] * (1.0 + f.k6 * math.cos(theta + f.phi - shift[j]))
                 kappa[j] *= _trapezoid(p * theta - shift[j])
                 Lj[j], Rj[j] = L * N[j] * N[j], R * N[j] * (1.0 + f.resistance)
                 if f.saturation_current > 0.0:

@@ -9,12 +9,14 @@ describes what is left, `examine` is the whole run, `pictures` shows it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ema.core import config
 from ema.core.records import Record
 from ema.discrepancy.findings import Findings
 from ema.discrepancy.report import Picture
+from ema.identification.alignment import aligned
 from ema.models.actuator import Actuator
 
 
@@ -27,5 +29,11 @@ def discrepancy(
     from .pictures import pictures
 
     plant = config.load(plant_file, Actuator)
+    read = [aligned(record, plant) for record in records]
+    notes = [note for _, own in read for note in own]
+    for note in notes:
+        say(note)
+    records = [record for record, _ in read]
     examination = examine(plant, measured(plant, records), say=say)
-    return examination.findings, lambda: pictures(examination)
+    findings = examination.findings
+    return replace(findings, notes=[*notes, *findings.notes]), lambda: pictures(examination)
