@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ema.core.errors import LogError
 
 from .times import TimeOption, time_range
+
+if TYPE_CHECKING:
+    from ema.log import LogReader
+    from ema.log.foreign import ForeignLog
 
 _TABLES = ("estimates", "envelopes", "events", "status")
 _WHAT = (*_TABLES, "signals", "cycles")
@@ -49,7 +55,7 @@ def export(
         if what:
             raise click.UsageError("--what names tables, and those need a directory as --out")
         with open_log(logs, start, end) as log:
-            click.echo(f"{out}: {_frames(log.frames(), out)} frames")
+            click.echo(f"{out}: {_frames(log, out)} frames")
             return
     from .table_files import TableFiles
     from .tables import codec_of, cycle_blocks, message_blocks, signal_blocks
@@ -72,17 +78,23 @@ def export(
             raise LogError(f"{', '.join(str(path) for path in logs)}: nothing of {', '.join(sorted(wanted))} in it")
 
 
-def _frames(batches: object, out: Path) -> int:
+def _frames(log: LogReader | ForeignLog, out: Path) -> int:
     import can
 
     from ema.core.can_messages import message
 
+    from .open_log import names
+
     if out.exists():
         raise LogError(f"{out}: exists, and is not overwritten")
+    batches = log.frames()
+    first = next(batches, None)
+    if first is None:
+        raise LogError(f"{names(log.paths)}: no frame in it")
     count = 0
     try:
         with can.Logger(out) as target:
-            for bus, frames in batches:  # type: ignore[attr-defined]
+            for bus, frames in chain([first], batches):
                 for frame in frames:
                     target(message(frame, bus or None))
                 count += len(frames)

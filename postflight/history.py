@@ -12,6 +12,7 @@ from ema.core.errors import LogError
 from ema.core.names import FAULTS
 from ema.log import LogReader
 
+from .open_log import names
 from .report_settings import ReportSettings
 from .series import OperatingTime, Series
 
@@ -112,7 +113,7 @@ def read(log: LogReader, settings: ReportSettings) -> History:
         except (KeyError, TypeError, ValueError) as error:
             raise LogError(f"a message on {topic} is not what this version writes ({error!r})") from error
     if not any(actuator.series for actuator in history.actuators.values()):
-        raise LogError(f"{', '.join(path.name for path in log.paths)}: no estimate in it")
+        raise LogError(f"{names(log.paths)}: no estimate in it")
     history.actuators = dict(sorted(history.actuators.items()))
     return history
 

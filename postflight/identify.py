@@ -30,6 +30,7 @@ from ema.monitor import (
     answered,
 )
 
+from .open_log import names
 from .received import Log, received, received_beside, worth_a_process
 
 _LOOK_AT = 20_000  # frames of a log without configuration, to see whose they are
@@ -68,7 +69,7 @@ def setup(log: Log, given: tuple[str, ...]) -> Setup:
     numbers = sorted(set(named) | {n for n in chosen if n is not None}) or _actuators_in(log)
     paths = {n: chosen.get(n) or chosen.get(None) or named.get(n) for n in numbers}
     if missing := [n for n, path in paths.items() if path is None]:
-        raise LogError(f"the log names no bundle for actuator {missing[0]}: name one with --bundle PATH")
+        raise LogError(f"{names(log.paths)}: names no bundle for actuator {missing[0]}: name one with --bundle PATH")
     loaded = {path: load_bundle(path) for path in sorted({str(path) for path in paths.values()})}
     bundles = {n: loaded[str(path)] for n, path in paths.items()}
     manifests = {n: attached.get(f"manifest-{n}.json", attached.get("manifest.json")) for n in numbers}
@@ -172,7 +173,9 @@ def _actuators_in(log: Log) -> list[int]:
         if count > _LOOK_AT:
             break
     if not found:
-        raise LogError(f"none of the first {count} frames is a PhaseCurrents frame of this project's DBC")
+        raise LogError(
+            f"{names(log.paths)}: none of the first {count} frames is a PhaseCurrents frame of this project's DBC"
+        )
     return sorted(found)
 
 

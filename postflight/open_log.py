@@ -43,3 +43,8 @@ def open_mcap(paths: Iterable[Path], start: TimeOption = None, end: TimeOption =
     first_ns = log.first_ns() or 0
     log.start_ns, log.end_ns = (None if t is None else t(first_ns) for t in (start, end))
     return log
+
+
+def names(paths: list[Path]) -> str:
+    """Logs for a message: the first, and how many more."""
+    return f"{paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else "")

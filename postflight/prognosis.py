@@ -26,12 +26,12 @@ MIN_POINTS = 8
 _N_DRAWS = 2000
 _N_BINS = 100
 _SPREAD = 0.15  # v
-_MIN_GROWTH = 4.0  # change of the trend over the history, in its standard deviations
+_MIN_GROWTH = 5.0  # change of the trend over the history, in its standard deviations
 _FARTHEST = 4.0  # remaining life told at most, in lengths of the growth seen
 _ONSETS = np.linspace(-0.05, 0.9, 20)  # t_0 in lengths of the history
 _RATES = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 6.0, 9.0)  # g times the length of the history
 _RUNAWAY = (0.3, 0.5, 0.65, 0.8, 0.9)  # s/τ today
-_ROUGHNESS = (0.0, 0.01, 0.03, 0.09)  # √q over the history, in thresholds
+_ROUGHNESS = (0.0, 0.01, 0.03, 0.09, 0.2)  # √q over the history, in thresholds
 _PRIOR_SHAPE = 2.0  # inverse-gamma prior of the noise scale squared, mean 1: the estimates' sd are roughly right
 _AHEAD = np.geomspace(1e-3, 40.0, 200)  # times at which paths are looked at, in lengths of the history
 

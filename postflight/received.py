@@ -22,6 +22,8 @@ from ema.log.foreign import ForeignLog
 from ema.log.scan import Damage
 from ema.monitor import Event, Job, MonitorSettings, Reception
 
+from .open_log import names
+
 LONG = 30_000_000  # below this a second process takes longer to start than it saves [B]
 _TOGETHER = 16  # items sent at once
 
@@ -49,7 +51,9 @@ def received(
         elif not channels or entry.bus in channels:
             only = only or entry.bus
             if entry.bus != only:
-                raise LogError(f"the log holds frames of channels '{only}' and '{entry.bus}': choose one by --channel")
+                raise LogError(
+                    f"{names(log.paths)}: frames of channels '{only}' and '{entry.bus}': choose one by --channel"
+                )
             yield from reception.feed(entry.frames)
     yield from reception.finish()
 

@@ -28,6 +28,11 @@ def recover(logs: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
     """
     from ema.log.reader import find_logs
 
+    if out is not None:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise LogError(f"{out}: cannot be made ({error.strerror})") from error
     answers = []
     failures = []
     for path in find_logs(logs, (".mcap",)):

@@ -20,6 +20,7 @@ from ema.log.segment import Segment
 
 from .compare import Comparison, Pair, Totals
 from .identify import Setup, identified, setup
+from .open_log import names
 from .received import Log
 
 _COMMIT_EVERY = 1000  # messages
@@ -52,7 +53,7 @@ def run(
         comparison.finish()
     seconds = time.monotonic() - started
     if not comparison.totals:
-        raise LogError("no cycle of a monitored actuator is in the log")
+        raise LogError(f"{names(log.paths)}: no cycle of a monitored actuator in it")
     click.echo(json.dumps(_answer(comparison, how), indent=2) if as_json else _text(comparison, how, seconds))
     for damage in getattr(log, "damage", []):
         click.echo(f"{damage}", err=True)

@@ -74,6 +74,7 @@ def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any]) 
     from ema.bus.interface import open_bus, parse
 
     from .onto import Replayer
+    from .open_log import names
     from .pacing import Pace
 
     stop = threading.Event()
@@ -98,7 +99,7 @@ def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any]) 
     for damage in getattr(log, "damage", []):
         click.echo(f"{damage}", err=True)
     if done.n_sent + done.n_refused + done.n_unmapped == 0 and not stop.is_set():
-        raise LogError("no frame in the log is chosen")
+        raise LogError(f"{names(log.paths)}: no frame in it is chosen")
     answer = {
         "sent": done.n_sent,
         "refused": done.n_refused,

@@ -1,0 +1,131 @@
+"""Every post-flight command on every kind of bad input: one clear line, nothing written, nothing overwritten."""
+
+import gc
+import shutil
+
+import can
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from ema_postflight.export import export
+from ema_postflight.identify_command import identify
+from ema_postflight.recover import recover
+from ema_postflight.replay import replay
+from ema_postflight.report import report
+from ema_postflight.watch import watch
+
+from ema.core.errors import EmaError, LogError
+from ema.log import LogReader, LogSettings
+from ema.log.segmented import SegmentedLog
+
+COMMANDS = {
+    "report": (report, ["--out", "{out}.html"]),
+    "export": (export, ["--out", "{out}"]),
+    "export frames": (export, ["--out", "{out}.blf"]),
+    "replay onto": (replay, ["--onto", "virtual:bad", "--speed", "inf"]),
+    "replay identify": (replay, ["--identify", "--bundle", "{bundle}", "--out", "{out}.mcap", "--cycles", "{out}.csv"]),
+    "identify": (identify, ["--bundle", "{bundle}"]),
+    "recover": (recover, ["--out", "{out}"]),
+}
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory, flight):
+    """Bad inputs by name."""
+    folder = tmp_path_factory.mktemp("bad")
+    rng = np.random.default_rng(3)
+    whole = sorted(flight.glob("*.mcap"))[0].read_bytes()
+    (folder / "empty.mcap").touch()
+    (folder / "noise.mcap").write_bytes(rng.bytes(3000))
+    (folder / "begun.mcap").write_bytes(whole[:60])
+    (folder / "directory").mkdir()
+    (folder / "text.txt").write_text("a letter")
+    (folder / "noise.blf").write_bytes(rng.bytes(300))
+    (folder / "noise.asc").write_bytes(rng.bytes(300))
+    (folder / "noise.log").write_text("not what candump writes\n")
+    (folder / "nothing").mkdir()
+    SegmentedLog(folder / "nothing", {}, LogSettings(keep_free=0), 10**18, 0.0).close()
+    with can.Logger(folder / "other.mcap") as log:  # another DBC's frames
+        for i in range(50):
+            log(can.Message(timestamp=1.7e9 + 0.01 * i, arbitration_id=0x100 + i % 7, is_extended_id=False, data=b"12"))
+    return folder
+
+
+def _run(command, path, tmp_path, bundle):
+    function, options = COMMANDS[command]
+    filled = [option.format(out=tmp_path / "out", bundle=bundle) for option in options]
+    return CliRunner().invoke(function, [str(path), *filled])
+
+
+# what a command may well do with one of them: send or convert frames of whatever kind, find a file sound
+FINE = {
+    *(("export frames", "other.mcap"), ("replay onto", "other.mcap")),
+    *(("recover", "nothing"), ("recover", "other.mcap"), ("recover", "begun.mcap")),
+}
+NAMES = (
+    "missing.mcap", "empty.mcap", "noise.mcap", "begun.mcap", "directory", "nothing", "other.mcap", "text.txt",
+    "noise.blf", "noise.asc", "noise.log",
+)  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # python-can leaves a bad BLF file open
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_bad_input_is_told_in_one_line(command, name, inputs, tmp_path, coarse_bundle):
+    answer = _run(command, inputs / name, tmp_path, coarse_bundle.path)
+    gc.collect()
+    if (command, name) in FINE:
+        assert answer.exit_code == 0, answer.output
+        return
+    assert answer.exit_code != 0, answer.output
+    if answer.exception is not None and not isinstance(answer.exception, SystemExit):
+        assert isinstance(answer.exception, EmaError), repr(answer.exception)
+        assert "\n" not in str(answer.exception)
+        assert name.split(".")[0] in str(answer.exception), answer.exception
+    left = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert left == [], "half an answer is left"
+
+
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name not in ("identify", "replay onto")])
+def test_nothing_is_overwritten(command, flight, tmp_path, coarse_bundle):
+    (tmp_path / "out").mkdir()
+    first = sorted(flight.glob("*.mcap"))[0]
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(first.read_bytes()[:-20])
+    mine = [tmp_path / name for name in ("out.html", "out.blf", "out.mcap", "out.csv", "out/cut.recovered.mcap")]
+    mine += [tmp_path / f"out/{table}.csv" for table in ("estimates", "envelopes", "events", "status")]
+    for path in mine:
+        path.write_text("mine")
+    answer = _run(command, cut, tmp_path, coarse_bundle.path)
+    assert isinstance(answer.exception, LogError), repr(answer.exception)
+    assert "is not overwritten" in str(answer.exception)
+    assert {path.read_text() for path in mine} == {"mine"}
+
+
+def test_a_truncated_log_is_read_as_far_as_it_goes(flight, tmp_path, coarse_bundle):
+    cut = tmp_path / "cut.mcap"
+    whole = sorted(flight.glob("*.mcap"))[0].read_bytes()
+    cut.write_bytes(whole[: whole.rfind(b"zstd", 0, -2000)])  # in the middle of a chunk's head
+    with LogReader(cut) as log:
+        n = sum(1 for _ in log.messages(lambda topic: topic.startswith("/estimate")))
+        assert log.unfinished
+    assert n > 0
+    for command in ("report", "export", "recover"):
+        answer = _run(command, cut, tmp_path, coarse_bundle.path)
+        assert answer.exit_code == 0, (n, answer.output, answer.exception)
+
+
+@pytest.mark.parametrize("command", ["replay identify", "identify"])
+def test_a_bundle_of_another_version_is_refused(command, flight, coarse_bundle, tmp_path):
+    bundle = tmp_path / "bundle"
+    shutil.copytree(coarse_bundle.path, bundle)
+    manifest = bundle / "manifest.json"
+    manifest.write_text(manifest.read_text().replace('"version": ', '"version": 9'))
+    answer = _run(command, sorted(flight.glob("*.mcap"))[0], tmp_path, bundle)
+    assert isinstance(answer.exception, EmaError)
+    assert "version 9" in str(answer.exception)
+
+
+def test_a_bus_that_is_not_there_is_told():
+    answer = CliRunner().invoke(watch, ["--bus", "nonsense:x", "--for", "1"])
+    assert isinstance(answer.exception, EmaError)
