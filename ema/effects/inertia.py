@@ -10,5 +10,5 @@ EFFECT = Effect(
     sentence="the moving inertia differs by {change:+.1%}",
     separated_by="weighing, or a known load that changes only the torque",
     mistaken_for=("k1",),
-    plants=("axis",),
+    plants=("ema", "axis"),
 )

@@ -88,6 +88,7 @@ def parameters(plant: Actuator, k: np.ndarray, effects: Effects, dT: float | np.
                 known = ", ".join(p.name for p in registry()[name].parameters)
                 raise ConfigError(f"effect '{name}' has no parameter '{parameter_name}'; it has: {known}")
             z[row(f"{name}.{parameter_name}")] = value
+    z[row("J_m")] *= 1.0 + z[row("inertia.change")]
     return z
 
 

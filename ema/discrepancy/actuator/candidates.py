@@ -128,6 +128,7 @@ def candidates(data: Measured, torques: Sequence[Torque]) -> list[Candidate]:
         _plain("current_gain", "gain_a", "gain_b", "gain_c", step=dict.fromkeys(("gain_a", "gain_b", "gain_c"), 0.02)),
         _plain("current_offset", "offset_a", "offset_b", "offset_c"),
         _plain("dead_time", "time"),
+        _plain("inertia", "change"),
         _plain("load_friction", "per_torque"),
         _plain("magnet_flux", "change"),
         _plain("position_delay", "time"),
