@@ -122,7 +122,7 @@ CASES: dict[str, Case] = {
     "hum on phase A": Case(_one("hum", 0.05, 0.2), outside=True),
     "shaker": Case(_one("shaker", 0.004, 0.015), outside=True),
     "weak leg": Case(_one("weak_leg", 0.01, 0.1), outside=True),
-    "heavier rotor": Case(_one("inertia", 0.1, 0.3), outside=True),
+    "inertia": Case(_one("inertia", 0.03, 0.3), ("inertia",), parameters={"inertia.change": lambda f: f["inertia"]}),
     "speed loop's gain": Case(_one("speed_gain", -0.3, -0.1), outside=True),
 }  # fmt: skip
 

@@ -102,6 +102,7 @@ def examine(
         v = search.verdict(after)
         say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     after, v = _simpler(search, after, v, alike)
+    after, v = _without_superfluous(search, after, v, alike)
     findings = _findings(search, before, after, v, alike)
     findings.notes.extend(conditions)
     return Examination(findings, search, before, after, verdict_before, v)
@@ -121,9 +122,23 @@ def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ..
     return model, v
 
 
+def _without_superfluous(
+    search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]
+) -> tuple[Model, Verdict]:
+    """`model` without the effects that later ones have made superfluous."""
+    for effect in model.effects[:-1]:
+        if search.owed_to(model, effect) < CHANCE:
+            reduced = search.without(model, effect)
+            if reduced.heldout < model.heldout + SAME:
+                del alike[model.effects.index(effect)]
+                model, v = reduced, search.verdict(reduced)
+                search.say(f"{effect.effect} is superfluous: p = {v.p_value:.2g}")
+    return model, v
+
+
 def _does_it(search: Search, model: Model, previous: Model) -> bool:
     """Whether the gain is the effect's own, and not that of faults fitted anew."""
-    return search.owed_to_last(model) > OWN_SHARE * (previous.heldout - model.heldout)
+    return search.owed_to(model, model.effects[-1]) > OWN_SHARE * (previous.heldout - model.heldout)
 
 
 def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]]) -> Findings:

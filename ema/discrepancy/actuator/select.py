@@ -148,9 +148,9 @@ class Search:
             ranked.append(Screened(promised, c, start))
         return sorted(ranked, key=lambda entry: entry.promised)
 
-    def owed_to_last(self, model: Model) -> float:
-        """How much of the held-out misfit comes back when the last effect is switched off and all else stays."""
-        neutral = {f.name: self.plant.neutral(f.name) for f in model.effects[-1].frees}
+    def owed_to(self, model: Model, effect: Candidate) -> float:
+        """How much of the held-out misfit comes back when an effect is switched off and all else stays."""
+        neutral = {f.name: self.plant.neutral(f.name) for f in effect.frees}
         left = residuals(self.plant, self.noise, {**model.fit.point, **neutral}, self.heldout, N_FINAL, FINAL_SEED)
         return self.noise.misfit(list(left.values()), self.heldout) - model.heldout
 
@@ -164,6 +164,13 @@ class Search:
         left = residuals(self.plant, self.noise, point, self.train, N_GLANCE)
         step, _ = bounded(self._columns(c), np.concatenate([left[cycle] for cycle in self.train]), *c.limits())
         return {**point, **c.start(step)}
+
+    def without(self, model: Model, effect: Candidate) -> Model:
+        """The model fitted anew without one of its effects."""
+        own = {f.name for f in effect.frees}
+        point = {name: value for name, value in model.fit.point.items() if not name.startswith(f"{effect.effect}.")}
+        frees = tuple(f for f in model.fit.free if f.name not in own)
+        return self.model(tuple(c for c in model.effects if c != effect), frees, point, model.fit.columns, 3)
 
     def extend(self, model: Model) -> list[Model]:
         """The best models with one more effect, best first."""
