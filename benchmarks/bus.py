@@ -20,6 +20,7 @@ from ema_simulator.scenario import Scenario
 from ema_simulator.traffic import Traffic
 
 from ema.bus import mmsg
+from ema.bus.authentication import Sealer, Verifier
 from ema.bus.codec import Codec
 from ema.bus.load import frame_time, load
 from ema.bus.port import RECEIVE_BUFFER, ask_for_buffer
@@ -27,6 +28,7 @@ from ema.bus.protection import Receiver, Sender
 from ema.bus.socketcan import SocketCanPort
 from ema.core import can_messages, config, resources
 from ema.core.errors import BusError
+from ema.core.frames import FrameFlag, joined
 from ema.models.actuator import Actuator
 from ema.monitor.assembler import Assembler
 from ema.monitor.settings import MonitorSettings
@@ -36,6 +38,7 @@ N_ACTUATORS = 6
 LIVE, FULL = 30, 500  # frames in a batch: six actuators read every 5 ms; a queue that has filled up
 ROUNDS = 7
 BUS_FULL = round(1.0 / frame_time(64, 1e6, 5e6))  # frames of 64 bytes that a bus of 1 and 5 Mbit/s carries [1/s]
+REFUSED = int(FrameFlag.REFUSED)
 PEER = "python-can Notifier + cantools decode"
 
 
@@ -122,6 +125,8 @@ def rows() -> list[dict[str, Any]]:
         row(f"bus of 1 and 5 Mbit/s, {what}: its load ({100 * n * one[1]:.0f} % with all stuff bits)",
             100 * n * one[0], limit, unit="%")  # fmt: skip
     row("frame out: sequence and CRC", _median(lambda: _protect(frames)))
+    for what, n_forged in (("", 0), (", two forged ones beside each", 2)):
+        row(f"frame verified, message authentication{what}", _median(lambda n=n_forged: _verify(frames, n, codec)))
     return found
 
 
@@ -170,6 +175,26 @@ def _check(before: np.ndarray, frames: np.ndarray, size: int, codec: Codec) -> f
     for batch in batches:
         receiver.check(batch)
     return (time.process_time() - begin) / frames.size * 1e6
+
+
+def _verify(frames: np.ndarray, n_forged: int, codec: Codec) -> float:
+    """Time for each genuine frame, seals included; forged ones have its number, so that each costs a MAC as well."""
+    key, on_bus = bytes(16), []
+    sealer, verifier = Sealer(codec, key), Verifier(codec, key)
+    for n in range(frames.size):
+        forged = np.repeat(frames[n : n + 1], n_forged)
+        forged["data"][:, 5] ^= 1
+        t_ns = int(frames["t_ns"][n])
+        seals = sealer.add(frames[n : n + 1], t_ns)
+        seals["t_ns"] = t_ns
+        on_bus += [forged, frames[n : n + 1], seals]
+    batches = _batches(joined(on_bus), LIVE)
+    begin = time.process_time()
+    n_passed = sum(int(((verifier.feed(part, 0)["flags"] & REFUSED) == 0).sum()) for part in batches)
+    took = time.process_time() - begin
+    if n_passed != frames.size:
+        raise RuntimeError(f"{n_passed} of {frames.size} frames are found genuine")
+    return took / frames.size * 1e6
 
 
 def _protect(frames: np.ndarray) -> float:

@@ -30,8 +30,29 @@ class Settings(BaseModel):
         return value
 
 
+_MOST_VALUES = 1_000_000
+
+
+def _n_values(node: Any, known: dict[int, int]) -> int:
+    """Values below a node, references written out; one that holds itself has more than any number."""
+    if id(node) not in known:
+        known[id(node)] = _MOST_VALUES + 1
+        parts = node.value if isinstance(node, yaml.CollectionNode) else []
+        nodes = [n for pair in parts for n in pair] if isinstance(node, yaml.MappingNode) else parts
+        known[id(node)] = 1 + sum(_n_values(part, known) for part in nodes)
+    return known[id(node)]
+
+
 class _UniqueKeyLoader(yaml.SafeLoader):
-    """SafeLoader that refuses a key given twice instead of keeping the last one silently."""
+    """SafeLoader that refuses a key given twice, instead of keeping the last one, and what references blow up."""
+
+    def get_single_node(self) -> Any:
+        node = super().get_single_node()
+        if node is not None and _n_values(node, {}) > _MOST_VALUES:
+            raise yaml.composer.ComposerError(
+                None, None, f"more than {_MOST_VALUES} values, by references to references", node.start_mark
+            )
+        return node
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
         if isinstance(node, yaml.MappingNode):

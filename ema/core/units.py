@@ -6,10 +6,18 @@ numbers (the daemon) stays small.
 
 from __future__ import annotations
 
+import re
+import tokenize
 from functools import cache
 from typing import Any
 
 from pydantic import Field
+
+_TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*((?:1\s*/\s*)?[^\W\d_].*|[°%].*)", re.DOTALL)
+_UNIT = re.compile(r"[\w°%/*^ .()-]{0,60}")
+_NO_POWER = re.compile(r"(?:\*\*|\^)\s*-?(?:\d\d|\s*\d?\s*(?:\*\*|\^))")  # pint would calculate 9**9**9**9
+# What pint's parser lets through, beside its own errors.
+_PARSER = (ValueError, TypeError, AssertionError, AttributeError, ArithmeticError, SyntaxError, tokenize.TokenError)
 
 
 @cache
@@ -27,12 +35,29 @@ def to_unit(value: str, unit: str) -> float:
     except ValueError:
         import pint
     try:
-        quantity = _registry().Quantity(value)
+        number, name = _parted(value)
+        quantity = _registry().Quantity(float(number), name)
         return float(f"{quantity.to(unit or 'dimensionless').magnitude:.15g}")  # 0.36 mH is 0.00036 H, not a bit less
     except pint.DimensionalityError as error:
         raise ValueError(f"{value!r} has the wrong unit, expected [{unit or '1'}]") from error
-    except (pint.UndefinedUnitError, pint.PintError, ValueError, TypeError, AssertionError) as error:
-        raise ValueError(f"{value!r} is not a number with a unit of [{unit or '1'}]") from error
+    except (pint.PintError, *_PARSER) as error:
+        raise ValueError(f"{value[:80]!r} is not a number with a unit of [{unit or '1'}]") from error
+
+
+def _parted(text: str) -> tuple[str, str]:
+    """Number and unit."""
+    match = _TEXT.fullmatch(text)
+    if match is None:
+        raise ValueError(text)
+    number, unit = match.groups()
+    _check(unit)
+    return number, unit
+
+
+def _check(unit: str) -> None:
+    """ValueError for what is no unit: pint would take it as something to be calculated."""
+    if not _UNIT.fullmatch(unit) or _NO_POWER.search(unit):
+        raise ValueError(unit)
 
 
 def convert(from_unit: str, unit: str) -> tuple[float, float]:
@@ -43,14 +68,15 @@ def convert(from_unit: str, unit: str) -> tuple[float, float]:
 
     try:
         registry = _registry()
+        _check(from_unit)
         zero, one = (
             float(registry.Quantity(x, from_unit or "dimensionless").to(unit or "dimensionless").magnitude)
             for x in (0.0, 1.0)
         )
     except pint.DimensionalityError as error:
         raise ValueError(f"[{from_unit}] cannot be converted to [{unit}]") from error
-    except (pint.PintError, ValueError, TypeError, AssertionError) as error:
-        raise ValueError(f"[{from_unit}] is not a known unit, expected one of [{unit}]") from error
+    except (pint.PintError, *_PARSER) as error:
+        raise ValueError(f"[{from_unit[:80]}] is not a known unit, expected one of [{unit}]") from error
     return one - zero, zero
 
 

@@ -136,21 +136,27 @@ def raw_can(vcan0):
 
 
 @pytest.fixture
-def candump(vcan0):
+def candump(vcan0, tmp_path):
     """Starts can-utils' candump, waits until it listens: `dump = candump(3)`; `dump()` gives its next 3 log lines."""
     running = []
 
     def start(n_frames):
-        words = ["candump", "-L", "-n", str(n_frames), "-T", "30000", vcan0]
-        listeners = _n_listeners()
-        process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        words = ["candump", "-L", "-n", str(n_frames), "-T", "120000", vcan0]
+        listeners, lines = _n_listeners(), tmp_path / f"candump-{len(running)}.log"
+        with lines.open("w") as file:  # a pipe nobody reads meanwhile would stop it
+            process = subprocess.Popen(words, stdout=file)
         running.append(process)
         deadline = time.monotonic() + 30
         while _n_listeners() == listeners:
             assert process.poll() is None, "candump ended at once"
             assert time.monotonic() < deadline, "candump did not open its socket"
             time.sleep(0.02)
-        return lambda: process.communicate(timeout=60)[0].splitlines()
+
+        def end():
+            process.wait(timeout=180)
+            return lines.read_text().splitlines()
+
+        return end
 
     yield start
     for process in running:
