@@ -8,6 +8,7 @@ import sys
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the daemon: on thirty equations threads only spin
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import ModuleType
@@ -75,13 +76,18 @@ def flux_bundle(shipped_plant, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def hidden() -> ModuleType:
+def support() -> Callable[[str], ModuleType]:
+    """Loads a module of tests/support by its name."""
+    return _support
+
+
+@pytest.fixture(scope="session")
+def hidden(support) -> ModuleType:
     """The independent actuator with flaws to hide (tests/support/hidden_actuator.py)."""
     return support("hidden_actuator")
 
 
-def support(name: str) -> ModuleType:
-    """A module of tests/support."""
+def _support(name: str) -> ModuleType:
     path = Path(__file__).parent / "support" / f"{name}.py"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None

@@ -3,13 +3,12 @@ from __future__ import annotations
 import pytest
 from ema_offline_builder.config import Builder
 
-from ema.core import config, resources
 from ema.models.actuator import Actuator
 
 
 @pytest.fixture(scope="session")
-def plant() -> Actuator:
-    return config.load(resources.config("actuator.yaml"), Actuator)
+def plant(shipped_plant) -> Actuator:
+    return shipped_plant
 
 
 @pytest.fixture(scope="session")
