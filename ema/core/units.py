@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import Field
 
-_TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*((?:1\s*/\s*)?[^\W\d_].*|[°%].*)", re.DOTALL)
+_TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*((?:1?\s*/\s*)?[^\W\d_].*|[°%].*)", re.DOTALL)
 _UNIT = re.compile(r"[\w°%/*^ .()-]{0,60}")
 _NO_POWER = re.compile(r"(?:\*\*|\^)\s*-?(?:\d\d|\s*\d?\s*(?:\*\*|\^))")  # pint would calculate 9**9**9**9
 # What pint's parser lets through, beside its own errors.
@@ -50,6 +50,7 @@ def _parted(text: str) -> tuple[str, str]:
     if match is None:
         raise ValueError(text)
     number, unit = match.groups()
+    unit = f"1{unit}" if unit.startswith("/") else unit
     _check(unit)
     return number, unit
 

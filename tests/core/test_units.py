@@ -1,0 +1,33 @@
+import pytest
+
+from ema.core.units import convert, to_unit
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("0.36 mH", "H", 0.00036),
+        ("6e4 1/s", "1/s", 6e4),
+        ("6e4 / s", "1/s", 6e4),
+        ("5e-3rad", "rad", 5e-3),
+        ("-0.12 %/K", "1/K", -0.0012),
+        ("20 °C", "K", 293.15),
+        ("3e-5 N m s/rad", "N m s/rad", 3e-5),
+        ("2.5 kg*m**2", "kg m^2", 2.5),
+        ("3 m/(s^2)", "m/s^2", 3.0),
+        ("1.5e-3 N*m/A^2", "N m/A^2", 1.5e-3),
+        ("30 %", "", 0.3),
+    ],
+)
+def test_a_number_with_its_unit(text, unit, value):
+    assert to_unit(text, unit) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text", ["9**9**9**9 s", "3 s**9**9", "3 s^99", "0.3 s\n{", "3 s (", "3 __import__", "[]", "s" * 500]
+)
+def test_what_is_no_quantity_is_refused_and_not_calculated(text):
+    with pytest.raises(ValueError, match="is not a number with a unit"):
+        to_unit(text, "s")
+    with pytest.raises(ValueError, match="is not a known unit"):
+        convert(text, "s")
