@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
-from ema.core.errors import ConfigError
+from ema.core.errors import ConfigError, RecordError
+from ema.core.records import Record
 
 # Which module examines which kind of plant.
 EXAMINERS = {"ema": "ema.discrepancy.actuator", "axis": "ema.discrepancy.axis"}
@@ -20,8 +22,9 @@ EXAMINERS = {"ema": "ema.discrepancy.actuator", "axis": "ema.discrepancy.axis"}
 @click.option(
     "--out", required=True, type=click.Path(path_type=Path), help="folder of findings.json, report.html, extended.yaml"
 )
+@click.option("--cycles", metavar="N,N,…", help="these cycles only, as an event 'model in doubt' names them")
 @click.option("--json", "as_json", is_flag=True, help="print findings.json instead of sentences")
-def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, as_json: bool) -> None:
+def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: str | None, as_json: bool) -> None:
     """Compare measured RECORDs with the simulation of the plant, and say what it gets wrong and why.
 
     Writes findings.json, report.html (opens offline) and extended.yaml: the plant with the effects that were found,
@@ -31,6 +34,7 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, as_json:
     Examples:
       ema discrepancy --plant config/actuator.yaml flight.csv --out findings
       ema discrepancy --plant bench.yaml sine.csv rolling.csv --out findings --json
+      ema discrepancy --plant actuator.yaml log/*.mcap --cycles 17,18,20 --out findings
     """
     from importlib import import_module
 
@@ -45,7 +49,7 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, as_json:
     if kind not in EXAMINERS:
         raise ConfigError(f"{plant_file}: key 'kind' = {kind!r}: must be one of {', '.join(EXAMINERS)}")
     examiner = import_module(EXAMINERS[kind])
-    read = [read_record(path) for path in records]
+    read = _chosen([read_record(path) for path in records], cycles)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -59,7 +63,8 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, as_json:
 
         findings, draw = examiner.discrepancy(plant_file, read, say)
         findings.write(out / "findings.json")
-        write_extended(plant_file, findings.effects, out / "extended.yaml", findings.fitted)
+        found = [*findings.effects, *findings.unnamed]
+        write_extended(plant_file, found, out / "extended.yaml", findings.fitted)
         say("pictures")
         name = str(config.read_yaml(plant_file).get("name", plant_file.stem))
         write_report(out / "report.html", name, [str(path) for path in records], findings, draw())
@@ -69,3 +74,21 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, as_json:
         for sentence in findings.sentences():
             click.echo(sentence)
         click.echo(f"{out / 'report.html'}")
+
+
+def _chosen(records: list[Record], numbers: str | None) -> list[Record]:
+    """The records with the cycles asked for only; those with none of them are left out."""
+    if numbers is None:
+        return records
+    try:
+        wanted = {int(number) for number in numbers.split(",")}
+    except ValueError as error:
+        raise ConfigError(f"--cycles {numbers}: must be cycle numbers with commas between them") from error
+    chosen = [replace(r, cycles=tuple(c for c in r if c.number in wanted)) for r in records]
+    if missing := wanted - {c.number for r in chosen for c in r}:
+        there = sorted({c.number for r in records for c in r})
+        raise RecordError(
+            f"cycle {min(missing)} is not in the records, or not whole (there are {len(there)}: "
+            f"{there[0]} … {there[-1]})"
+        )
+    return [r for r in chosen if r.n_cycles]

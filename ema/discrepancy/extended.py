@@ -18,16 +18,18 @@ def write_extended(
 ) -> None:
     """Write `plant_file` with the effects' values and intervals of 95 %; what an engineer would say stands at the top.
 
-    An effect found more than once (cogging lines) gets a number: ``cogging#2``. `fitted` replaces further keys.
+    An axis may have an effect more than once (cogging lines): the next gets a number, ``cogging#2``. On an actuator the
+    values found replace those of the file. `fitted` replaces further keys.
     """
     data: dict[str, Any] = config.read_yaml(plant_file)
     declared: dict[str, dict[str, float]] = dict(data.get("effects") or {})
     intervals: dict[str, dict[str, list[float]]] = dict(data.get("intervals") or {})
     comments = [f"# {plant_file.name} with what `ema discrepancy` found in measured records."]
     written: set[str] = set()
+    several = data.get("kind") == "axis"
     for effect in effects:
         key, number = effect.name, 1
-        while key in written or (effect.name == "cogging" and key in declared):
+        while several and (key in written or (effect.name == "cogging" and key in declared)):
             number += 1
             key = f"{effect.name}#{number}"
         written.add(key)

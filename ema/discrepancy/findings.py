@@ -61,6 +61,8 @@ class Findings:
         Held-out errors by record, where records differ in kind.
     fitted : dict
         Values that replace those of the plant file beside the effects.
+    unnamed : list of FoundEffect
+        Structure that is written into the extended plant without being a cause.
     """
 
     verdict: Literal["adequate", "explained", "unexplained"]
@@ -71,6 +73,7 @@ class Findings:
     notes: list[str] = field(default_factory=list)
     records: list[dict[str, Any]] = field(default_factory=list)
     fitted: dict[str, Any] = field(default_factory=dict)
+    unnamed: list[FoundEffect] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
         """The content of findings.json."""

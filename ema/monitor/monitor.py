@@ -161,6 +161,7 @@ def _judgement(job: Job, doubt: ModelDoubt, arbitrated: bool) -> Event:
         text = f"{job.method}: the residuals of cycles {cycles} are larger than the noise explains"
         if arbitrated:
             return Event(job.t_ns, Level.INFO, "beyond_linear", f"{text}; {ARBITER} is asked", job.actuator)
+        text += f"; for the cause: ema discrepancy LOG --plant FILE --cycles {','.join(map(str, doubt.cycles))}"
         return Event(job.t_ns, Level.WARNING, "model_in_doubt", text, job.actuator)
     text = f"{job.method}: the noise explains the residuals again, last of cycle {job.cycle}"
     return Event(job.t_ns, Level.INFO, "model_trusted", text, job.actuator)

@@ -198,7 +198,9 @@ def test_another_actuator_than_the_bundle_knows_puts_the_model_in_doubt(bench, f
     events = [o for o in outputs if isinstance(o, Event)]
     assert [e.code for e in events if e.text.startswith("linear")] == ["beyond_linear"]
     assert "cycles 0, 1, 2 are larger" in events[0].text
-    assert [e.code for e in events if e.text.startswith("lf2")] == ["model_in_doubt"]
+    (doubt,) = [e for e in events if e.text.startswith("lf2")]
+    assert doubt.code == "model_in_doubt"
+    assert doubt.text.endswith("ema discrepancy LOG --plant FILE --cycles 0,1,2")
     last = linear(outputs)[-1].estimate
     assert last.reasons & Reason.MODEL_IN_DOUBT
     assert last.status is Status.DEGRADED

@@ -181,7 +181,8 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
         {"name": " + ".join(m.names) or "faults only", "score": -m.heldout}
         for m in sorted(search.tried, key=lambda m: m.heldout)
     ]
-    return Findings(verdict, found, _gain(search, before, after), shape, tried, notes)
+    unnamed = [_found(search, after, c.effect, (), "torque_line") for c in odd]
+    return Findings(verdict, found, _gain(search, before, after), shape, tried, notes, unnamed=unnamed)
 
 
 def _integer(fit: Fit) -> bool:
@@ -196,8 +197,9 @@ def interval(fit: Fit, name: str) -> float:
     return float(np.sqrt(fit.covariance[j, j] * max(fit.misfit, 1.0)))
 
 
-def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...]) -> FoundEffect:
-    e = registry()[effect]
+def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...], told_as: str = "") -> FoundEffect:
+    """What was fitted as `effect`, told as that or as another effect with the same parameters."""
+    e = registry()[told_as or effect]
     fit = model.fit
     bounds = {f.name: f for f in fit.free}
     values = {p.name: fit.point.get(f"{effect}.{p.name}", p.neutral) for p in e.parameters}
@@ -210,7 +212,7 @@ def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...]) ->
                 values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
             )
     return FoundEffect(
-        effect, _confidence(search, model, effect), alike, parameters, e.sentence.format(**values), e.separated_by
+        e.name, _confidence(search, model, effect), alike, parameters, e.sentence.format(**values), e.separated_by
     )
 
 
