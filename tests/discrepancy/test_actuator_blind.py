@@ -35,7 +35,7 @@ def test_neither_nothing_nor_a_fault_is_an_effect(hidden, shipped_plant, k):
 
 @pytest.mark.slow
 def test_magnet_flux_is_named_from_a_file_and_extends_the_plant(hidden, tmp_path):
-    """A weaker magnet reads as three shorted phases until it is named; `extended.yaml` then holds it."""
+    """A weaker magnet reads as three shorted phases until it is named beside them; `extended.yaml` then holds it."""
     write_csv(hide(hidden, flux=-0.06, k1=0.03), tmp_path / "flight.csv")
     plant = str(resources.config("actuator.yaml"))
     out = tmp_path / "found"
@@ -48,6 +48,7 @@ def test_magnet_flux_is_named_from_a_file_and_extends_the_plant(hidden, tmp_path
     findings = json.loads((out / "findings.json").read_text())
     assert findings["verdict"] == "explained"
     assert [e["name"] for e in findings["effects"]] == ["magnet_flux"]
+    assert findings["effects"][0]["indistinguishable_from"] == ["k3 and k4 and k5 alike"]
     assert findings["effects"][0]["parameters"]["change"]["value"] == pytest.approx(-0.06, abs=0.004)
     assert min(findings["gain"]["k_before"][2:5]) > 0.04
     assert max(findings["gain"]["k_after"][1:]) < 0.02

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator import features as f
 from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.fit import residuals
+from ema.discrepancy.actuator.gear import resonance
+from ema.discrepancy.actuator.noise import Noise, verdict
+from ema.discrepancy.actuator.plant import EmaPlant
 from ema.models import hf
 
 
@@ -48,3 +53,40 @@ def test_two_implementations_agree_within_noise(hidden, shipped_plant):
     sd = np.sqrt(ours.var(axis=0, ddof=1) + floor**2)
     z = (theirs.mean(axis=0) - ours.mean(axis=0)) / (sd * np.sqrt(1 / 6 + 1 / n))
     assert np.mean(z**2) < 1.5
+
+
+def nothing_is_noise(plant, record: Record) -> bool:
+    """Whether the nominal simulation leaves noise of a flawless actuator's record."""
+    data = measured(plant, [record])
+    ema = EmaPlant(plant, data)
+    noise = Noise(ema, {})
+    cycles = range(data.n_cycles)
+    left = residuals(ema, noise, {}, cycles, 16)
+    nothing_free = [np.zeros((len(data.y[ema.first[m]]), 0)) for m in range(ema.n_motions)]
+    return verdict(noise, [left[c] for c in cycles], cycles, nothing_free, 1.0 / 16).is_noise
+
+
+def test_a_record_cut_out_of_a_longer_motion_starts_in_motion(hidden, shipped_plant):
+    whole = hidden.cycle(hidden.Flaws(), hidden.sine(6e-3, 5.0, 0.36), hidden.rest(), 3)
+    cut = Cycle(0, {name: x[500:3500] for name, x in whole.items()})
+    assert measured(shipped_plant, [Record((cut,))]).speed[0] > 10.0
+    assert nothing_is_noise(shipped_plant, Record((cut,)))
+
+
+@pytest.mark.parametrize("substeps", [50, 200])
+def test_another_integration_step_is_noise(hidden, shipped_plant, substeps):
+    """What a simulation's grid makes of its comparators is no effect: 2 and 0.5 µs where ours takes 1."""
+    bench = hidden.BENCH._replace(substeps=substeps)
+    cycle = hidden.cycle(hidden.Flaws(), hidden.sine(0.0138, 2.0, 0.4), hidden.rest(), 5, bench)
+    assert nothing_is_noise(shipped_plant, Record((Cycle(0, cycle),)))
+
+
+def test_a_resonating_gear_is_seen_in_rotor_and_user(hidden, shipped_plant):
+    command = hidden.chirp()
+    soft = hidden.cycle(hidden.Flaws(compliance=1.5e-5, user_damping=30.0), command, hidden.rest(), 1)
+    found = resonance(shipped_plant, measured(shipped_plant, [Record((Cycle(0, soft),))]))
+    assert found is not None
+    assert found.compliance == pytest.approx(1.5e-5, rel=0.2)
+    assert found.inertia == pytest.approx(0.6, rel=0.2)
+    stiff = hidden.cycle(hidden.Flaws(), command, hidden.rest(), 1)
+    assert resonance(shipped_plant, measured(shipped_plant, [Record((Cycle(0, stiff),))])) is None

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ema.effects import registry
+from ema.models.actuator import Actuator
 
 from .cycles import Measured
 from .features import Array
 from .fit import Free, free
+from .gear import resonance
 from .plant import Point
 from .weak import Torque, bumps, lines
 
@@ -118,7 +120,7 @@ def _plain(effect: str, *names: str, step: Mapping[str, float] | None = None, **
     return Candidate(effect, tuple(frees), fixed, names, at)
 
 
-def candidates(data: Measured, torques: Sequence[Torque]) -> list[Candidate]:
+def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque]) -> list[Candidate]:
     """What to try on these cycles; nonlinear parameters where the residual torque suggests them."""
     found = [
         _plain("asymmetric_friction", "asymmetry"),
@@ -140,11 +142,6 @@ def candidates(data: Measured, torques: Sequence[Torque]) -> list[Candidate]:
         *(_plain("stribeck", "excess", speed=speed) for speed in (4.0, 15.0, 40.0)),
         _plain("viscous_drag", "coefficient"),
         _plain("winding_resistance", "change"),
-        *(
-            _plain("gear_compliance", "compliance", step={"compliance": c}, inertia=inertia, damping=0.05)
-            for c in (5e-6, 3e-5, 1e-4)
-            for inertia in (0.2, 0.8)
-        ),
     ]
     if all(s.u_dc is not None for s in data.signals):
         found.append(_plain("supply_sag", "resistance"))
@@ -156,6 +153,10 @@ def candidates(data: Measured, torques: Sequence[Torque]) -> list[Candidate]:
         found.append(_plain("adc_saturation", "limit", step={"limit": top - 30.0}))
     if not torques:
         return found
+    gear = resonance(plant, data)
+    if gear is not None:
+        step = {"compliance": gear.compliance}
+        found.append(_plain("gear_compliance", "compliance", step=step, inertia=gear.inertia, damping=gear.damping))
     for order, _ in lines(torques):
         frees = (
             free("cogging.amplitude", 0.002),

@@ -21,6 +21,8 @@ T_20 = 20.0  # [°C] temperature of the nominal parameters
 MIN_DURATION = 0.2  # [s]
 MAX_LAG = 6e-3  # [s] no sensor or loop of this plant is that late; channels are apart
 MAX_CLIPPED = 0.1  # share of samples at the largest value
+AT_REST_SPEED = 0.1  # [rad/s]
+START_SAMPLES = 10
 AT_REST = 1e-3  # [s] at the start of a cycle, over which the position is averaged
 
 
@@ -43,6 +45,8 @@ class Measured:
         [A]
     start : array, shape (n_cycles, 2)
         θ_u and θ_m at the start. [rad]
+    speed : array, shape (n_cycles,)
+        ω_m at the start: a record may be cut out of a longer motion. [rad/s]
     holding : array, shape (n_cycles, 3)
         Phase currents at the start, their mean taken off. [A]
     dT : array, shape (n_cycles,)
@@ -59,6 +63,7 @@ class Measured:
     y: list[Array]
     envelopes: list[Array]
     start: Array
+    speed: Array
     holding: Array
     dT: Array
     has_temperature: bool
@@ -98,6 +103,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
     rest = max(1, round(AT_REST * plant.control.rate))
     start = np.array([[s.theta_u[0, :rest].mean(), s.theta_m[0, 0]] for s in signals])
     holding = np.array([s.i[0, :, :rest].mean(axis=1) for s in signals])
+    speed = np.array([_speed_at_start(s.theta_m[0], plant.control.rate) for s in signals])
     dT = np.array([cycle["temp_w"].mean() - T_20 if with_temperature else 0.0 for _, cycle in everything])
     return Measured(
         tuple(labels),
@@ -107,6 +113,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
         [stacked(features(plant, s))[0] for s in signals],
         [envelope(s.i, plant.control.rate)[0] for s in signals],
         start,
+        speed,
         holding - holding.mean(axis=1, keepdims=True),
         dT,
         with_temperature,
@@ -133,6 +140,19 @@ def _motion(commands: list[Array], command: Array, plant: Actuator) -> int:
             return index
     commands.append(command)
     return len(commands) - 1
+
+
+def _speed_at_start(theta_m: Array, rate: float) -> float:
+    """ω_m at the first sample; zero at rest and where motion only begins (coarse angles are taken over more samples).
+
+    From rest the second difference is at least three times the first; what moves already has two alike.
+    """
+    step = _step(theta_m)
+    m = START_SAMPLES if step else 1
+    first, second = float(theta_m[m] - theta_m[0]), float(theta_m[2 * m] - theta_m[m])
+    w = (3.0 * first - second) * rate / (2.0 * m)
+    moving = first * second > 0.0 and abs(first) > 0.5 * abs(second)
+    return w if moving and abs(w) > max(AT_REST_SPEED, 3.0 * step * rate / m) else 0.0
 
 
 def _step(x: Array) -> float:

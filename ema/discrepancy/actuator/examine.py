@@ -24,9 +24,9 @@ from .structure import structure
 
 MIN_CYCLES = 2
 WORTH_IT = 0.25  # share of what is left that a further effect must take on held-out cycles
-ENOUGH = 0.1  # share of what faults alone leave, from which effects explain it but for the form of their laws
+ENOUGH = 0.05  # share of what faults alone leave, from which effects explain it but for the form of their laws
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
-NAMED = 0.5  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
+NAMED = 0.95  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
 OWN_SHARE = 0.5  # of a gain that must go when the effect alone is switched off
 ALIKE = 0.6  # share by which two models may leave more or less and be alike: laws are approximations
 NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
@@ -89,7 +89,9 @@ def examine(
         enough = after is not before and after.excess < ENOUGH * before.excess + SLACK
         models = search.extend(after)
         needed = (STRONG if enough else WORTH_IT) * after.excess
-        real = [m for m in models if after.excess - m.excess >= needed and _does_it(search, m, after)]
+        real = [
+            m for m in models if after.excess - m.excess >= needed and _is_credible(m) and _does_it(search, m, after)
+        ]
         if not real:
             break
         best = real[0]
@@ -134,6 +136,17 @@ def _without_superfluous(
                 model, v = reduced, search.verdict(reduced)
                 search.say(f"{effect.effect} is superfluous: p = {v.p_value:.2g}")
     return model, v
+
+
+def _is_credible(model: Model) -> bool:
+    """Whether no parameter of the last effect is driven to what is physically credible at most."""
+    effect = model.names[-1]
+    for p in registry()[effect].parameters:
+        x = model.fit.point.get(f"{effect}.{p.name}")
+        margin = 1e-3 * (p.high - p.low)
+        if x is not None and any(abs(x - end) < margin and end != p.neutral for end in (p.low, p.high)):
+            return False
+    return True
 
 
 def _does_it(search: Search, model: Model, previous: Model) -> bool:

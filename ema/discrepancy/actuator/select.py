@@ -174,7 +174,9 @@ class Search:
 
     def extend(self, model: Model) -> list[Model]:
         """The best models with one more effect, best first."""
-        found = [c for c in candidates(self.plant.data, self.torques(model)) if c.effect not in model.names]
+        found = [
+            c for c in candidates(self.plant.plant, self.plant.data, self.torques(model)) if c.effect not in model.names
+        ]
         refined: dict[str, Model] = {}
         cost = sum(float(r @ r) for r in model.fit.residuals.values())
         for s in self.screen(model, found):
@@ -184,12 +186,8 @@ class Search:
                 break
             if s.candidate.effect not in refined:
                 refined[s.candidate.effect] = self._refined(model, s)
-        for name, m in self._close(refined, NEAR_NOISE):
-            refined[name] = self.model(m.effects, m.fit.free, m.fit.point, None, 4)
-        for name, m in self._close(
-            refined, 0.0
-        ):  # a rival is out only if it leaves more when fitted as well as the best
-            again = self.model(m.effects, m.fit.free, m.fit.point, None, 3)
+        for name, m in self._close(refined):  # a rival is out only if it leaves more when fitted as well as the best
+            again = self.model(m.effects, m.fit.free, m.fit.point, None, 4)
             refined[name] = min(m, again, key=lambda x: x.heldout)
         return sorted(refined.values(), key=lambda m: m.heldout)
 
@@ -200,7 +198,7 @@ class Search:
         """
         k = model.fit.point
         found = []
-        for c in candidates(self.plant.data, []):
+        for c in candidates(self.plant.plant, self.plant.data, []):
             faults = [name for name in registry()[c.effect].mistaken_for if name in FAULTS]
             common = min((k.get(name, 0.0) for name in faults), default=0.0)
             gone = [name for name in faults if k.get(name, 0.0) - common < K_SEEN]
@@ -214,12 +212,12 @@ class Search:
             found.append(self.model((*model.effects, c), (*frees, *c.frees), start, model.fit.columns, 3))
         return sorted(found, key=lambda m: m.heldout)
 
-    def _close(self, refined: dict[str, Model], above: float) -> list[tuple[str, Model]]:
-        """The models near the best, and none if the best stands alone and leaves less than `above`."""
+    def _close(self, refined: dict[str, Model]) -> list[tuple[str, Model]]:
+        """The models near the best; none if the best stands alone and leaves nothing."""
         ranked = sorted(refined.items(), key=lambda item: item[1].heldout)
         best = ranked[0][1]
         near = [(name, m) for name, m in ranked[:3] if m.excess < 2.0 * best.excess + 0.2]
-        return near if (len(near) > 1 if above == 0.0 else best.excess > above) else []
+        return near if len(near) > 1 or best.excess > NEAR_NOISE else []
 
     def _refined(self, model: Model, s: Screened) -> Model:
         frees = (*model.fit.free, *s.candidate.frees)

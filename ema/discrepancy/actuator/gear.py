@@ -1,0 +1,102 @@
+"""A gear train that gives: its resonance from rotor and user alone, found without simulating the motor.
+
+A resonance is no small change of anything, so no finite difference points at it. But with the measured rotor as input,
+the user behind a spring is a small model of its own,
+
+    J_u dω_u/dt = K δ + 2 ζ √(K J_u) (ω_m/GR - ω_u)  where the gap is closed,   δ = deflection(θ_u, θ_m/GR, b)
+
+in which only K/J_u and ζ matter for θ_u; the torque balance of the motor, which accelerates J_u too, then tells J_u.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from scipy.optimize import minimize
+
+from ema.effects.backlash import deflection
+from ema.models.actuator import Actuator
+
+from .cycles import Measured
+from .features import GROUPS, Array, acceleration, local_mean, motor_torque, spacing
+
+FREQUENCIES = np.geomspace(100.0, 2000.0, 32)  # [rad/s]
+DAMPINGS = (0.01, 0.03, 0.1, 0.3)
+WIDER = (1.0, 4.0)  # times the nominal backlash
+CLEAR = 0.7  # share of the squared gap's change from which a resonance is worth simulating
+INERTIAS = (0.1, 2.5)  # [kg m²]
+N_CYCLES = 4
+MOVING = 10.0  # [rad/s] slower, dry friction takes up what it likes
+SCALE = 0.05  # what weak magnets or shorts make of the torque's scale, a priori
+REST = 0.1  # [N m] what is left of a cycle's torque balance, root of the sum of squares
+
+
+class Resonance(NamedTuple):
+    """Start values of the effect `gear_compliance`: rad/(N m), kg m², damping ratio."""
+
+    compliance: float
+    inertia: float
+    damping: float
+
+
+@njit(nogil=True)
+def _user(shaft: Array, start: float, w_0: float, zeta: float, b: float, T: float) -> Array:
+    """θ_u of a user behind a spring, driven by θ_m/GR. [rad]"""
+    theta, w = start, 0.0
+    out = np.empty(len(shaft))
+    out[0] = start
+    for t in range(1, len(shaft)):
+        twist = deflection(theta, shaft[t], b)
+        push = w_0 * w_0 * twist
+        if twist != 0.0:
+            push += 2.0 * zeta * w_0 * ((shaft[t] - shaft[t - 1]) / T - w)
+        w += T * push
+        theta += T * w
+        out[t] = theta
+    return out
+
+
+def resonance(plant: Actuator, data: Measured) -> Resonance | None:
+    """The likeliest resonance of the gear train, None where a stiff one explains the user as well."""
+    T, GR = 1.0 / plant.control.rate, plant.transmission.GR
+    signals = data.signals[:N_CYCLES]
+    shafts = [np.ascontiguousarray(s.theta_m[0] / GR) for s in signals]
+
+    def misfit(w_0: float, zeta: float, b: float) -> float:
+        total = 0.0
+        for shaft, s in zip(shafts, signals, strict=True):
+            away = s.theta_u[0] - _user(shaft, float(s.theta_u[0, 0]), w_0, zeta, b, T)
+            total += float(np.mean((away - away.mean()) ** 2))
+        return total
+
+    stiff = sum(float(np.var(s.theta_u[0] - shaft)) for shaft, s in zip(shafts, signals, strict=True))
+    grid = [(w, z, plant.transmission.b * x) for w in FREQUENCIES for z in DAMPINGS for x in WIDER]
+    best = min(grid, key=lambda x: misfit(*x))
+    found = minimize(lambda x: misfit(*np.exp(x)), np.log(best), method="Nelder-Mead", options={"maxiter": 80})
+    if found.fun > CLEAR * stiff:
+        return None
+    w_0, zeta, b = np.exp(found.x)
+    inertia = _inertia(plant, data, [_user(x, float(s.theta_u[0, 0]), w_0, zeta, b, T)
+                                     for x, s in zip(shafts, signals, strict=True)])  # fmt: skip
+    return Resonance(float(1.0 / (w_0**2 * inertia)), inertia, float(np.clip(zeta, 0.005, 0.5)))
+
+
+def _inertia(plant: Actuator, data: Measured, users: list[Array]) -> float:
+    """Inertia at the user that closes the motor's torque balance beside friction. [kg m²]"""
+    T = 1.0 / plant.control.rate
+    A, y = [], []
+    for s, user in zip(data.signals, users, strict=False):
+        m = spacing(GROUPS["torque"][0], plant.control.rate, len(user))
+        w_m = np.gradient(s.theta_m[0], T)
+        tau = local_mean(motor_torque(plant, s)[0][0], m)
+        signs, speed = local_mean(np.tanh(w_m / 2.0), m), local_mean(w_m, m)
+        a_u = acceleration(user, m, T)
+        moving = np.abs(speed) > MOVING
+        A.append(np.stack([a_u / plant.transmission.GR, signs, speed, tau, np.ones_like(tau)])[:, moving])
+        y.append((tau - plant.motor.J_m * acceleration(s.theta_m[0], m, T) - plant.motor.C * speed)[moving])
+    A.append(np.array([[0.0, 0.0, 0.0, REST / SCALE, 0.0]]).T)
+    y.append(np.zeros(1))
+    coefficients, *_ = np.linalg.lstsq(np.concatenate(A, axis=1).T, np.concatenate(y), rcond=1e-9)
+    return float(np.clip(coefficients[0], *INERTIAS))
