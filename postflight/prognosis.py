@@ -28,6 +28,7 @@ _N_BINS = 100
 _SPREAD = 0.15  # v
 _MIN_GROWTH = 5.0  # change of the trend over the history, in its standard deviations
 _FARTHEST = 4.0  # remaining life told at most, in lengths of the growth seen
+_LATEST = 8.0  # a later end of the interval, in lengths of the history, is a growth that may be settling
 _ONSETS = np.linspace(-0.05, 0.9, 20)  # t_0 in lengths of the history
 _RATES = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 6.0, 9.0)  # g times the length of the history
 _RUNAWAY = (0.3, 0.5, 0.65, 0.8, 0.9)  # s/τ today
@@ -84,7 +85,7 @@ def prognosis(trend: Trend, threshold: float, rng: np.random.Generator) -> Progn
     quantiles = np.quantile(life, LEVELS, method="inverted_cdf")
     if not quantiles[1] <= _FARTHEST * np.median(grown):
         return _silence(f"farther away than {_FARTHEST:g} times the growth seen")
-    if not np.isfinite(quantiles[2]):
+    if not quantiles[2] <= _LATEST:
         return _silence("the growth may end before the threshold")
     return Prognosis("", quantiles * span, life * span)
 
