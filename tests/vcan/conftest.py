@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from ema.bus import codec
+from ema.bus.port import RECEIVE_BUFFER
 from ema.bus.socketcan import SocketCanPort
 from ema.core.status import Status
 from ema.log import LogReader
@@ -141,7 +142,7 @@ def candump(vcan0, tmp_path):
     running = []
 
     def start(n_frames):
-        words = ["candump", "-L", "-n", str(n_frames), "-T", "120000", vcan0]
+        words = ["candump", "-L", "-n", str(n_frames), "-T", "120000", "-r", str(RECEIVE_BUFFER), vcan0]
         listeners, lines = _n_listeners(), tmp_path / f"candump-{len(running)}.log"
         with lines.open("w") as file:  # a pipe nobody reads meanwhile would stop it
             process = subprocess.Popen(words, stdout=file)
