@@ -19,18 +19,19 @@ from ema.core.errors import BundleError
 from ema.core.names import FAULTS
 from ema.faults import N_FAULTS
 from ema.identification.known_error import KnownError, n_terms
-from ema.identification.noise import NoiseModel
+from ema.identification.noise import N_START, NoiseModel
 from ema.identification.nuisance import Nuisance
 from ema.models.actuator import Actuator
 from ema.models.lf2 import Lf2
 
 FORMAT = "ema-bundle"
-VERSION = 5
+VERSION = 6
 _LF2 = tuple(field.name for field in fields(Lf2) if field.name != "i0")
 SHAPES = {
     "i0": ("n_t",), "v1": ("n_t",), "eigenvalue_share": ("r",), "schedule": ("n_omega",), "A": ("n_omega", 6),
     "A_full": ("n_t", 6), "A_step": (6,), "Q": ("n_omega", 6), "R": (6, 6),
-    "noise_switching": ("n_omega", "n_omega"), "noise_start": ("n_omega", "n_omega"), "start_B": ("n_omega", 2),
+    "noise_switching": ("n_omega", "n_omega"), "noise_start": ("n_omega", "n_omega"),
+    "noise_start_k": ("n_omega", "n_omega"), "start_B": ("n_omega", N_START),
     "start_scale": (2,), "noise_sizes": ("n_levels",), "noise_spreads": (2,),
     "noise_linear": (2, "n_levels", "n_omega", "n_omega"), "noise_lf2": (2, "n_levels", "n_omega", "n_omega"),
     "error_lf2": ("n_terms", "n_omega"), "noise_lf1": (2, "n_levels", "n_omega", "n_omega"),
@@ -111,6 +112,7 @@ class Bundle:
             spreads=a["noise_spreads"],
             model_error=a.get(f"noise_{method}", np.zeros((2, len(a["noise_sizes"]), 1, 1))),
             start=a["noise_start"],
+            start_k=a["noise_start_k"],
             B=a["start_B"],
             start_scale=a["start_scale"],
         )

@@ -20,7 +20,7 @@ from ema.reduction.schedules import Knowledge, schedule
 from . import noise
 from .config import Builder
 from .library import fit_library
-from .runs import Plan
+from .runs import Plan, paired
 from .snapshots import READ, Snapshots
 
 THETA_U, THETA_M = STATE.index("theta_u"), STATE.index("theta_m")
@@ -113,15 +113,21 @@ def analyse(
         levels[name] = noise.model_error(noise.corrected(model, error), sets, S)
     sizes = [float(np.sqrt(np.mean(np.sum(k**2, axis=1)))) for k, _, _ in sets]
 
-    starts = plan.groups["start"]
+    starts, n = slice(plan.groups["start"].start, plan.groups["start, faulty"].stop), builder.n_start
     s = np.column_stack([plan.start[starts, THETA_U], plan.start[starts, THETA_M] / plant.transmission.GR])
-    B, start_rest, scale = noise.start_influence(envelopes[starts][:, points].astype(float) - i0[points], s, S)
+    cold = np.zeros((starts.stop - starts.start, len(points))) + i0[points]
+    twins = {k_max: 0.5 * (a + b) for k_max, (_, a, b) in zip(builder.heldout.k_max, sets, strict=True)}
+    cold[n:] = np.vstack([twins[k_max][rows] for k_max, rows in paired(builder)])
+    n_own = np.where(np.arange(len(cold)) < n, 1.0, 1.5)
+    B, start_rest, start_k, scale = noise.start_influence(
+        envelopes[starts][:, points].astype(float) - cold, s, plan.k[starts], n_own, S
+    )
 
     Q, R = np.linalg.qr(A)
     arrays = {
         "i0": i0, "noise_rms": noise_rms, "A_full": A_full, "A": A, "A_step": steps, "Q": Q, "R": R,
         "v1": modes.v[:, 0], "eigenvalue_share": modes.share, "schedule": points.astype(np.int64),
-        "noise_switching": S, "noise_start": start_rest, "start_B": B, "start_scale": scale,
+        "noise_switching": S, "noise_start": start_rest, "noise_start_k": start_k, "start_B": B, "start_scale": scale,
         "noise_sizes": np.array(sizes), "noise_spreads": noise.spreads(sets), "lf1_tuning": tuning.as_array(),
         **{f"noise_{name}": level for name, level in levels.items()},
         **{f"error_{name}": error.coefficients for name, error in known.items()},

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ema.identification.known_error import KnownError
-from ema.identification.noise import spread
+from ema.identification.noise import spread, start_features
 
 from .config import Builder
 from .runs import START_OFFSET, Plan
@@ -88,26 +88,46 @@ def _model_error(model: Model, k: np.ndarray, first: np.ndarray, second: np.ndar
     return np.asarray(L @ (U * lam) @ U.T @ L.T)
 
 
-def start_influence(x: np.ndarray, s: np.ndarray, S: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Linear influence of the start state and the spread it leaves.
+def start_influence(
+    x: np.ndarray, s: np.ndarray, k: np.ndarray, n_own: np.ndarray, S: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Influence of the start state and the spread it leaves.
 
     Parameters
     ----------
     x : array, shape (n, n_omega)
-        Deviation of the envelope from the nominal one at the schedule. [A]
+        Deviation of the envelope from that of a cold start at the schedule. [A]
     s : array, shape (n, 2)
         Start: user position, gear output θ_m/GR. [rad]
+    k : array, shape (n, 6)
+        Faults.
+    n_own : array, shape (n,)
+        Switching covariances that x contains: one of its own, and its share of the cold runs'.
     S : array, shape (n_omega, n_omega)
         Switching covariance. [A²]
 
     Returns
     -------
-    B (n_omega, 2), covariance of the rest per unit distance² (n_omega, n_omega), scale of the start (2,)
+    B (n_omega, N_START), covariance of the rest per unit distance² and per ‖k‖² of that (n_omega, n_omega) each,
+    scale of the start (2,)
     """
-    B = np.linalg.lstsq(s, x, rcond=None)[0].T
     scale = np.full(2, START_OFFSET)
+    F = start_features(s / scale, k)
+    size2 = np.sum(k**2, axis=1)
+    weighted = F / (1.0 + size2 / KNEE**2)[:, None]  # what is left grows with the faults
+    G = F.T @ weighted
+    B = np.linalg.solve(G + 1e-3 * np.diag(np.diag(G)), weighted.T @ x).T
+    rest = x - F @ B.T
     d2 = np.sum((s / scale) ** 2, axis=1)
-    rest = x - s @ B.T
-    excess = (rest.T @ (rest * d2[:, None]) - d2.sum() * S) / np.sum(d2**2)  # regression of rest restᵀ - S on d²
-    lam, U = np.linalg.eigh(0.5 * (excess + excess.T))
-    return B, (U * np.maximum(lam, 0.0)) @ U.T, scale
+    D = np.column_stack([d2, d2 * size2])  # regression of rest restᵀ - S on both
+    w = 1.0 / (1.0 + d2 * (1.0 + size2 / KNEE**2)) ** 2  # the larger the spread, the less a run says of it
+    excess = np.linalg.solve(
+        D.T @ (D * w[:, None]),
+        [(rest.T @ (rest * (w * c)[:, None]) - np.sum(w * c * n_own) * S).ravel() for c in D.T],
+    ).reshape(2, *S.shape)
+    return B, _positive(excess[0]), _positive(excess[1]), scale
+
+
+def _positive(S: np.ndarray) -> np.ndarray:
+    lam, U = np.linalg.eigh(0.5 * (S + S.T))
+    return np.asarray((U * np.maximum(lam, 0.0)) @ U.T)

@@ -16,6 +16,7 @@ def draw(out: Path, bundle: Bundle, results: dict[str, Any]) -> None:
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import LogLocator
 
     plt.rcParams.update({"figure.dpi": 90, "font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
 
@@ -34,15 +35,23 @@ def draw(out: Path, bundle: Bundle, results: dict[str, Any]) -> None:
         for j, name in enumerate(SETS):
             data = [results[f"identifier {m}"][name][quantity] for m in METHODS]
             places = [i + 0.3 * j for i in range(len(METHODS))]
-            boxes = axis.boxplot(data, positions=places, widths=0.25, patch_artist=True, sym=".", manage_ticks=False)
+            boxes = axis.boxplot(data, positions=places, widths=0.25, patch_artist=True, sym=".", manage_ticks=False,
+                                 medianprops={"color": "black", "lw": 1.5})  # fmt: skip
             for box in boxes["boxes"]:
                 box.set_facecolor(f"C{j}")
+            if quantity == "err_k":
+                axis.axhline(results["identifier linear"][name]["null"], color=f"C{j}", ls=":", lw=1)
             axis.plot([], [], "s", color=f"C{j}", label=f"{name}: U(0, {SETS[name]:g})")
         axis.set_yscale("log")
         axis.set_xticks([i + 0.15 for i in range(len(METHODS))], METHODS, rotation=30, ha="right")
-        axis.set(title={"err_k": "error of the faults, err_k", "err_i": "error of the signal rebuilt, err_i"}[quantity])
-        axis.legend(frameon=False)
+        axis.axvline(2.65, color="0.6", lw=0.8)  # the paper's, this project's
+        axis.set(title={"err_k": "error of the faults, err_k (dotted: k̂ = 0)",
+                        "err_i": "error of the signal rebuilt, err_i"}[quantity])  # fmt: skip
+        axis.yaxis.set_tick_params(labelleft=True)
+        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        axis.yaxis.set_major_formatter("{x:g}")
         axis.grid(axis="y", alpha=0.3)
+    axes[0].legend(frameon=False)
     figure.savefig(out / "figure2.png")
 
     found = results["schedules"]
@@ -53,6 +62,8 @@ def draw(out: Path, bundle: Bundle, results: dict[str, Any]) -> None:
         axis.set(xscale="log", yscale="log", xlabel="number of points n_ω", ylabel="median err_k", title=f"{test} set")
         axis.set_xticks(found["n"], [str(n) for n in found["n"]])
         axis.minorticks_off()
+        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.yaxis.set_major_formatter("{x:g}")
         axis.grid(alpha=0.3)
     axes[0].legend(frameon=False)
     figure.savefig(out / "schedules.png")

@@ -23,9 +23,11 @@ def page(bundle: Bundle, results: dict[str, Any]) -> str:
         "# The paper reproduced",
         f"Written by `ema reproduce`. Bundle: {m['figures']['n_runs']:.0f} HF runs, of these "
         f"{m['builder']['campaign']['n_snapshots']} snapshots for the POD; builder seed {m['builder']['seed']}, "
-        f"seed of the experiments {e.SEED}. Times are of the machine and the load at that moment; everything else "
+        f"seed of the experiments {e.SEED}. Times are the processor's, of this machine; everything else "
         "repeats with the seeds. *textbook*: as in the paper, no weights, nothing known of the model's error. Without "
-        "that word: weighted by the measured noise, the model's known error taken off (not for `linear`), 0 ≤ k ≤ 1.",
+        "that word: weighted by the measured noise, the model's known error taken off (not for `linear`), 0 ≤ k ≤ 1. "
+        "`hf`: Gauss–Newton on the HF model, begun at LF2's answer; all its runs of a cycle together correct LF2 near "
+        "the answer.",
         _models(r["models"]),
         "## POD and sampling points\n\n![Figure 1](figure1.png)\n\n"
         f"λ₁ share {bundle.arrays['eigenvalue_share'][0]:.4f} (paper: 0.7575, with other parameters and another range "
@@ -74,7 +76,11 @@ def _identifiers(found: dict[str, Any], err: dict[str, Any]) -> str:
     ]
     head = ["method", "err_k small", "err_k large", "err_i small", "err_i large", "time small [s]", "time large [s]",
             "paper's time [s]"]  # fmt: skip
-    return f"Medians over {e.N_TEST} fault vectors each, one cycle each; table 1:\n\n" + _table(head, rows)
+    return (
+        f"Medians over {e.N_TEST} fault vectors each (hf: {e.N_HF}), one cycle each; table 1. err_i is that of the "
+        "signal over the whole cycle, rebuilt by the model alone: what is known of a model's error is known at the "
+        "scheduled instants only.\n\n" + _table(head, rows)
+    )
 
 
 CLAIMS = ["50 %", "90 %", "95 %", "p < 0.001", "p < 0.01", "p < 0.05"]
@@ -94,8 +100,9 @@ def _coverage(r: dict[str, Any]) -> str:
         if abs(share - float(level)) > 0.03
     ]
     return (
-        f"## Uncertainty\n\nShare of true faults within the 50, 90 and 95 % intervals ({6 * e.N_TEST} each, with the "
-        "standard error of so many cycles), and share of cycles whose chi-square test of fit fails at the level said "
+        "## Uncertainty\n\nShare of true faults within the 50, 90 and 95 % intervals "
+        f"({6 * e.N_TEST} each, hf {6 * e.N_HF}, with the standard error of so many cycles), "
+        "and share of cycles whose chi-square test of fit fails at the level said "
         "(the models are right there, so it should be the level).\n\n"
         + _table(["method", "set", *CLAIMS], [[*key, *_claims(c)] for key, c in found.items()])
         + "\n\nFarther from their level than the 3 points aimed at: " + ("; ".join(outside) or "none") + "."
@@ -120,7 +127,7 @@ def _combined(found: dict[str, Any]) -> str:
     rows = [[method, test, *_f(found[test][method])] for test in e.SETS for method in found[test]]
     return (
         f"## Several cycles combined\n\nEnvelopes of so many cycles averaged, median err_k over {e.N_COMBINED} fault "
-        "vectors. Switching averages out, a model's own error does not; that of `hf` is what its runs leave.\n\n"
+        "vectors. Switching averages out, a model's own error does not.\n\n"
         + _table(["method", "set", *map(str, found["n"])], rows)
     )
 
@@ -150,8 +157,9 @@ def _schedules(found: dict[str, Any]) -> str:
     return (
         "Median err_k, weighted linear identifier, weights for the range of the set:\n\n"
         + _table(["schedule", "set", *map(str, found["n"])], rows)
-        + "\n\n" + " ".join(said) + " `greedy` knows the Jacobian and the noise at k = 0 and is made for early signs; "
-        "`schedule.method` in the builder's configuration chooses."
+        + "\n\n" + " ".join(said) + " `greedy` knows the Jacobian and the noise at k = 0 and is made for early signs: "
+        "it is recommended where those matter most (`schedule.method` in the builder's configuration). SOM stays the "
+        "default: the paper's, and as good as any on the large set."
     )  # fmt: skip
 
 

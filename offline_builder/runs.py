@@ -61,14 +61,23 @@ def plan(builder: Builder, plant: Actuator, nuisance: Nuisance = NONE) -> Plan:
         for level in sweep:
             groups[f"level {fault} {level:g}"] = _along(j, level, builder.n_seeds, d)
     groups["start"] = np.zeros((builder.n_start, d))
+    groups["start, faulty"] = np.vstack([groups[f"heldout {k_max:g}"][rows] for k_max, rows in paired(builder)])
 
     x = np.clip(np.concatenate(list(groups.values())), low, high)
     bounds = np.cumsum([0, *map(len, groups.values())])
     slices = {name: slice(int(a), int(b)) for name, a, b in zip(groups, bounds[:-1], bounds[1:], strict=True)}
     start = hf.cold_start(plant, len(x))
-    start[slices["start"]] = random_starts(plant, x[slices["start"]], builder.seed + 1)
+    for n, name in ((1, "start"), (4, "start, faulty")):
+        start[slices[name]] = random_starts(plant, x[slices[name]], builder.seed + n)
     seeds = np.random.SeedSequence(builder.seed).generate_state(len(x), np.uint64).astype(np.int64) & (2**62 - 1)
     return Plan(x=x, seeds=seeds, start=start, groups=slices, nuisance=nuisance)
+
+
+def paired(builder: Builder) -> list[tuple[float, np.ndarray]]:
+    """Which held-out faults are run again from random starts: rows of each k_max, both of many and of few."""
+    n, sets = builder.heldout.n, builder.heldout.k_max
+    each = min(-(-builder.n_start // len(sets)), n)
+    return [(k_max, np.linspace(0, n - 1, each).astype(int)) for k_max in sets]
 
 
 def latin_hypercube(n: int, k_max: float, seed: int, d: int = N_FAULTS) -> np.ndarray:

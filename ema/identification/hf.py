@@ -89,7 +89,7 @@ class HfInLoop:
         correction = Correction(x, y, self.switching, M, length)
         own = {field.name: getattr(noise, field.name) for field in fields(NoiseModel)}
         if measurement.start is not None:
-            own["start"] = np.zeros_like(noise.start)  # HF knows what the start state does
+            own["start"] = own["start_k"] = np.zeros_like(noise.start)  # HF knows what the start state does
         return GaussNewton(
             *(self.method, lambda x, start: smooth(x, start) + correction(x), _Left(**own, correction=correction)),
             lambda m: at,

@@ -20,7 +20,7 @@ def make(bundle: Bundle) -> GaussNewton:
     library, error = bundle.lf2().at(bundle.schedule), bundle.known_error("lf2")
 
     def model(x: np.ndarray, start: np.ndarray | None) -> np.ndarray:
-        return library(x[..., :N_FAULTS]) + error(x) + noise.start_shift(start)
+        return library(x[..., :N_FAULTS]) + error(x) + noise.start_shift(start, x[..., :N_FAULTS])
 
     nuisance = bundle.nuisance
     return GaussNewton("lf2", model, noise, nuisance.started_by(first), nuisance=nuisance)

@@ -12,7 +12,7 @@ from .estimate import Estimate
 from .fit import Problem, concluded, enough, not_estimated
 from .measurement import Measurement
 from .noise import NoiseModel
-from .nuisance import NONE, Nuisance
+from .nuisance import N_FAULTS, NONE, Nuisance
 
 if TYPE_CHECKING:
     from ema.bundle import Bundle
@@ -41,9 +41,12 @@ class Linear:
         if not enough(measurement):
             return not_estimated(self.method, measurement, Reason.GAP_AT_SCHEDULE)
         v = measurement.valid
-        delta = (measurement.i_hat - self.i0 - self.noise.start_shift(measurement.start))[v]
-        x = np.zeros(self.A.shape[1])
-        problem = Problem(x, self.A[v], delta)
+        A, x = self.A.copy(), np.zeros(self.A.shape[1])
+        shift, *with_faults = self.noise.start_shift(
+            measurement.start, np.vstack([np.zeros(N_FAULTS), np.eye(N_FAULTS)])
+        )
+        A[:, :N_FAULTS] += (with_faults - shift).T  # the start's influence is linear in k
+        problem = Problem(x, A[v], (measurement.i_hat - self.i0 - shift)[v])
         for _ in range(3):  # weights depend on the size of the faults, and the other way round
             white = problem.whitener(measurement, self.noise, self.nuisance, x)
             solution = problem.solved(white, self.nuisance)

@@ -1,12 +1,12 @@
 """How much a measured envelope may differ from a model's: by switching, by the model's own error, by the start state.
 
-    Σ(k, start) = Σ_switch + M(k) + d² Σ_start
+    Σ(k, start) = Σ_switch + M(k) + d² (Σ_start + ‖k‖² Σ_start,k)
 
 Σ_switch: two runs of the same actuator differ by what decides its comparators. M: covariance of the model's error,
 measured by the builder on held-out faults of some sizes ‖k‖, apart for faults that grow alone or in twos and threes and
-for all at once, since models err differently there. Between sizes its trace follows a power of ‖k‖. Σ_start: what is
-left of the start state's influence when its linear part is taken off; it grows with the distance d of the start from
-the middle of the gap at zero.
+for all at once, since models err differently there. Between sizes its trace follows a power of ‖k‖. Σ_start, Σ_start,k:
+what is left of the start state's influence when its regressed part is taken off; it grows with the distance d of the
+start from the middle of the gap at zero, and with the faults: in a worn gear the user lies farther from the motor.
 """
 
 from __future__ import annotations
@@ -16,8 +16,11 @@ from functools import cached_property
 
 import numpy as np
 
+from ema.faults import N_FAULTS
+
 D2_UNKNOWN = 4.0  # d² if nobody measured the start
 D2_MAX = 25.0
+N_START = 2 + 2 * N_FAULTS + 3
 
 
 @dataclass(frozen=True)
@@ -34,10 +37,10 @@ class NoiseModel:
         Mean `spread` of the few and of the many faults with which it was measured. [1]
     model_error : array, shape (2, m, n_omega, n_omega)
         Covariance of the model's error for few and for many faults at these sizes. [A²]
-    start : array, shape (n_omega, n_omega)
-        Covariance for a start at d = 1. [A²]
-    B : array, shape (n_omega, 2)
-        Linear influence of the start state: user position, gear output. [A/rad]
+    start, start_k : arrays, shape (n_omega, n_omega)
+        Covariances for a start at d = 1, without faults and by ‖k‖² of them. [A²]
+    B : array, shape (n_omega, N_START)
+        Influence of the start state, regressed on `start_features`. [A]
     start_scale : array, shape (2,)
         Start offsets for which d is 1. [rad]
     """
@@ -47,17 +50,20 @@ class NoiseModel:
     spreads: np.ndarray
     model_error: np.ndarray
     start: np.ndarray
+    start_k: np.ndarray
     B: np.ndarray
     start_scale: np.ndarray
 
-    def start_shift(self, start: np.ndarray | None) -> np.ndarray:
-        """Linear influence of the start state on the envelope, shape (n_omega,). [A]"""
-        return np.zeros(len(self.B)) if start is None else self.B @ start
+    def start_shift(self, start: np.ndarray | None, k: np.ndarray) -> np.ndarray:
+        """Influence of the start state on the envelope with faults `k` (..., 6), shape (..., n_omega). [A]"""
+        if start is None:
+            return np.zeros((*k.shape[:-1], len(self.B)))
+        return np.asarray(start_features(start / self.start_scale, k) @ self.B.T)
 
     def covariance(self, start: np.ndarray | None, k: np.ndarray) -> np.ndarray:
         """Σ for a cycle that began at `start` with faults near `k`."""
         d2 = D2_UNKNOWN if start is None else min(float(np.sum((start / self.start_scale) ** 2)), D2_MAX)
-        return self.switching + self.of_model(k) + d2 * self.start
+        return self.switching + self.of_model(k) + d2 * (self.start + float(k @ k) * self.start_k)
 
     def of_model(self, k: np.ndarray) -> np.ndarray:
         """M(k), shape (n_omega, n_omega); beyond the sizes measured as between the last two. [A²]"""
@@ -88,6 +94,16 @@ class NoiseModel:
     def beyond(self, k: np.ndarray) -> bool:
         """Whether the faults are clearly larger than any the model was measured for."""
         return bool(np.sqrt(k @ k) > 1.25 * self.sizes[-1])
+
+
+def start_features(s: np.ndarray, k: np.ndarray) -> np.ndarray:
+    """What the start's influence is regressed on: s, its products with the faults and with itself.
+
+    `s` (..., 2) start over its scale, `k` (..., 6); shape (..., N_START).
+    """
+    s = np.broadcast_to(s, (*k.shape[:-1], 2))
+    with_faults = (s[..., :, None] * k[..., None, :]).reshape(*k.shape[:-1], 2 * N_FAULTS)
+    return np.concatenate([s, with_faults, s**2, s[..., :1] * s[..., 1:]], axis=-1)
 
 
 def spread(k: np.ndarray) -> np.ndarray:

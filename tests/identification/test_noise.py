@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.identification.noise import NoiseModel, spread
+from ema.identification.noise import N_START, NoiseModel, spread
 
 SIZES = np.array([0.1, 0.2, 0.4])
 FEW, MANY = np.diag([1.0, 0.0]), np.diag([0.0, 1.0])
 MODEL_ERROR = np.array([[size**4 * shape for size in SIZES] for shape in (FEW, MANY)])
-NOISE = NoiseModel(
-    1e-9 * np.eye(2), SIZES, np.array([1 / 6, 1.0]), MODEL_ERROR, np.zeros((2, 2)), np.zeros((2, 2)), np.ones(2)
-)
+NO_START = (*np.zeros((2, 2, 2)), np.zeros((2, N_START)), np.ones(2))
+NOISE = NoiseModel(1e-9 * np.eye(2), SIZES, np.array([1 / 6, 1.0]), MODEL_ERROR, *NO_START)
 
 
 def test_spread_of_one_and_of_all():
@@ -32,5 +31,5 @@ def test_without_faults_a_model_does_not_err():
 
 
 def test_an_error_never_seen_stays_none():
-    none = NoiseModel(np.eye(2), SIZES, np.array([0.2, 0.8]), 0.0 * MODEL_ERROR, *np.zeros((2, 2, 2)), np.ones(2))
+    none = NoiseModel(np.eye(2), SIZES, np.array([0.2, 0.8]), 0.0 * MODEL_ERROR, *NO_START)
     assert np.allclose(none.covariance(np.zeros(2), np.full(6, 0.3)), np.eye(2))

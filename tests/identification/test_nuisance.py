@@ -12,7 +12,7 @@ from ema.core.status import Reason, Status
 from ema.identification import Measurement, identifier
 from ema.identification.gauss_newton import GaussNewton
 from ema.identification.linear import Linear
-from ema.identification.noise import NoiseModel
+from ema.identification.noise import N_START, NoiseModel
 from ema.identification.nuisance import NONE, Nuisance
 from ema.models.envelope import envelope
 
@@ -21,7 +21,7 @@ RNG = np.random.default_rng(5)
 A = RNG.standard_normal((N, 6))
 S = 1e-4 * np.eye(N)
 LEVELS = np.array([0.1, 1.0]), np.array([0.3, 0.7]), np.zeros((2, 2, N, N))
-NOISE = NoiseModel(S, *LEVELS, np.zeros((N, N)), np.zeros((N, 2)), np.ones(2))
+NOISE = NoiseModel(S, *LEVELS, *np.zeros((2, N, N)), np.zeros((N, N_START)), np.ones(2))
 DRAG = Nuisance(("viscous_drag.coefficient",), ("N m s/rad",), *(np.array([v]) for v in (2e-5, 1e-4, 0.0, 1e-4, 3e-5)))
 
 
