@@ -48,12 +48,12 @@ class Breaking(ThreadPoolExecutor):
 @pytest.fixture(scope="session")
 def built(tiny, plant, tmp_path_factory):
     out = tmp_path_factory.mktemp("built") / "bundle"
-    with ThreadPoolExecutor(2) as pool:
+    with ThreadPoolExecutor(8) as pool:
         build(tiny, plant, out, pool)
     return bundle.load(out)
 
 
-def test_the_same_bits_from_one_worker_or_two_and_after_an_interruption(tiny, plant, built, tmp_path):
+def test_the_same_bits_from_one_worker_or_eight_and_after_an_interruption(tiny, plant, built, tmp_path):
     out = tmp_path / "bundle"
     with Breaking(2) as pool, pytest.raises(KeyboardInterrupt):
         build(tiny, plant, out, pool)
