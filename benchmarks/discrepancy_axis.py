@@ -1,13 +1,18 @@
 """Blind table of the axis plant: effects hidden by tests/support, found (or not) by `ema.discrepancy`.
 
-python -m benchmarks.discrepancy_axis [--seeds N] [--none N] [NAME…]
+python -m benchmarks.discrepancy_axis [--seeds N] [--none N] [--first N] [--log FILE] [NAME…]
+
+Seed by seed through all effects; every answer is appended to the log as one line of JSON, and a log can be continued or
+printed alone (--seeds 0 --none 0).
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -19,28 +24,83 @@ from ema.models.axis_config import RotaryAxis
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 
 CONFIDENT = 0.9
+COLUMNS = ("right", "in two", "in more", "unsure", "with a wrong one", "wrong", "missed")
+NOTHING = "nothing"
 
 
 def look(names, seed):
+    """Examine a bench with `names` hidden in it; what was said, as plain numbers."""
     import axis_bench
     import hidden_axis
 
     bench, truth, rng = hidden_axis.bench_with(names, seed)
-    plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [axis_bench.record(bench, rng)])
-    return examine(plant), truth
+    plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [axis_bench.record(bench, rng)], n_threads=1)
+    o = examine(plant)
+    return {
+        "hidden": "+".join(names) or NOTHING,
+        "seed": seed,
+        "truth": {name: {key: float(x) for key, x in values.items()} for name, values in truth.items()},
+        "verdict": o.verdict,
+        "effects": [
+            [
+                e["name"],
+                e["confidence"],
+                e["indistinguishable_from"],
+                {k: q["value"] for k, q in e["parameters"].items()},
+            ]
+            for e in o.effects
+        ],
+        "structure": [term["sentence"] for term in o.structure.get("terms", [])],
+        "rms": [o.records[0].rms_before, o.records[0].rms_after],
+        "error": [o.heldout.err_before, o.heldout.err_after, o.heldout.noise_floor],
+    }
 
 
-def rate(outcome, name):
-    """Right, in a set of two, in a larger set, wrong with confidence, or missed."""
-    found = {e["name"] for e in outcome.effects}
-    sets = [{e["name"], *e["indistinguishable_from"]} for e in outcome.effects]
-    wrong = any(name not in s and e["confidence"] > CONFIDENT for s, e in zip(sets, outcome.effects, strict=True))
+def rate(answer: dict[str, Any], names: list[str]) -> str:
+    """Right, in a set of two, in a larger set, right but unsure, wrong with confidence, or missed."""
+    effects = answer["effects"]
+    sets = [{name, *others} for name, _, others, _ in effects]
+    wrong = any(sure > CONFIDENT and not s & set(names) for s, (_, sure, _, _) in zip(sets, effects, strict=True))
+    found = all(any(name in s for s in sets) for name in names)
     if wrong:
-        return "wrong" if not any(name in s for s in sets) else "with a wrong one"
-    sizes = [len(s) for s in sets if name in s]
-    if not sizes:
+        return "with a wrong one" if found else "wrong"
+    if not found:
         return "missed"
-    return "right" if name in found and min(sizes) == 1 else ("in two" if min(sizes) == 2 else "in more")
+    own = [(s, e) for s, e in zip(sets, effects, strict=True) if s & set(names)]
+    largest = max(min(len(s) for s in sets if name in s) for name in names)
+    if largest > 1:
+        return "in two" if largest == 2 else "in more"
+    return "right" if all(sure > CONFIDENT for _, (_, sure, _, _) in own) else "unsure"
+
+
+def rate_outside(answer: dict[str, Any]) -> str:
+    """Outside the library nothing may be named with confidence, and the verdict must stay unexplained."""
+    if any(sure > CONFIDENT for _, sure, _, _ in answer["effects"]):
+        return "wrong"
+    return "right" if answer["verdict"] == "unexplained" else "missed"
+
+
+def table(answers: list[dict[str, Any]]) -> None:
+    """Print what was found."""
+    import hidden_axis
+
+    none = [a for a in answers if a["hidden"] == NOTHING]
+    if none:
+        alarms = sum(a["verdict"] != "adequate" for a in none)
+        low, high = stats.binomtest(alarms, len(none)).proportion_ci(0.95)
+        print(f"nothing hidden: {alarms} alarms in {len(none)} seeds, rate {low:.3f} to {high:.3f} (95 %)")
+    print(f"{'hidden':32}{'seeds':>6}" + "".join(f"{c:>17}" for c in COLUMNS) + f"{'rms after':>11}{'after/floor':>13}")
+    for hidden in dict.fromkeys(a["hidden"] for a in answers if a["hidden"] != NOTHING):
+        mine = [a for a in answers if a["hidden"] == hidden]
+        names = hidden.split("+")
+        outside = any(name in hidden_axis.OUTSIDE for name in names)
+        rated = [rate_outside(a) if outside else rate(a, names) for a in mine]
+        print(
+            f"{hidden:32}{len(mine):6d}"
+            + "".join(f"{rated.count(c):17d}" for c in COLUMNS)
+            + f"{np.median([a['rms'][1] for a in mine]):11.2f}"
+            + f"{np.median([a['error'][1] / a['error'][2] for a in mine]):13.2f}"
+        )
 
 
 def main() -> None:
@@ -49,34 +109,25 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--none", type=int, default=100)
-    parser.add_argument("names", nargs="*")
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument("--log", type=Path)
+    parser.add_argument("names", nargs="*", help="effects to hide, several at once as A+B")
     arguments = parser.parse_args()
-    if arguments.none:
-        alarms = sum(look([], seed)[0].verdict != "adequate" for seed in range(arguments.none))
-        low, high = stats.binomtest(alarms, arguments.none).proportion_ci(0.95)
-        print(
-            f"nothing hidden: {alarms} alarms in {arguments.none} seeds, rate {low:.3f} to {high:.3f} (95 %)",
-            flush=True,
-        )
-    columns = ("right", "in two", "in more", "with a wrong one", "wrong", "missed")
-    print(f"{'hidden':22}" + "".join(f"{c:>17}" for c in columns) + f"{'rms after':>11}{'err after/floor':>17}")
-    for name in arguments.names or [*hidden_axis.LIBRARY, *hidden_axis.OUTSIDE]:
-        counts = dict.fromkeys(columns, 0)
-        rms, ratio, verdicts = [], [], []
-        for seed in range(arguments.seeds):
-            outcome, _ = look([name], seed)
-            rms.append(outcome.records[0].rms_after)
-            ratio.append(outcome.heldout.err_after / outcome.heldout.noise_floor)
-            verdicts.append(outcome.verdict)
-            if name in hidden_axis.LIBRARY:
-                counts[rate(outcome, name)] += 1
-            else:  # outside the library nothing may be named with confidence
-                sure = outcome.verdict != "unexplained" or any(e["confidence"] > CONFIDENT for e in outcome.effects)
-                counts["wrong" if sure else "right"] += 1
-        print(
-            f"{name:22}" + "".join(f"{counts[c]:17d}" for c in columns)
-            + f"{np.median(rms):11.2f}{np.median(ratio):17.2f}", flush=True,
-        )  # fmt: skip
+    answers = []
+    if arguments.log and arguments.log.exists():
+        answers = [json.loads(line) for line in arguments.log.read_text().splitlines()]
+    done = {(a["hidden"], a["seed"]) for a in answers}
+    wanted = [(NOTHING, seed) for seed in range(arguments.first, arguments.first + arguments.none)]
+    for seed in range(arguments.first, arguments.first + arguments.seeds):
+        wanted += [(name, seed) for name in arguments.names or [*hidden_axis.LIBRARY, *hidden_axis.OUTSIDE]]
+    for hidden, seed in wanted:
+        if (hidden, seed) in done:
+            continue
+        answers.append(look([] if hidden == NOTHING else hidden.split("+"), seed))
+        if arguments.log:
+            with arguments.log.open("a") as file:
+                file.write(json.dumps(answers[-1]) + "\n")
+    table(answers)
 
 
 if __name__ == "__main__":

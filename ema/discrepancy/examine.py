@@ -10,7 +10,7 @@ import numpy as np
 
 from .fitting import Fit, fit, jacobian
 from .outcome import Gain, Outcome, RecordGain
-from .plant import Candidate, Errors, Plant, Point
+from .plant import Candidate, Errors, Free, Plant, Point
 from .selection import (
     FORM,
     Progress,
@@ -31,6 +31,9 @@ from .verdict import Verdict, judge
 
 MAX_EFFECTS = 3
 MAX_TERMS = 3
+MAX_ADDED = 5  # of both kinds, further lines of a kind that is there already counted too
+MANY = 12  # free parameters from which an effect is revised beside its strongest rivals only
+N_RIVALS = 6
 MIMICKED = 0.02  # of an effect's mark in power, where less is left of it beside the base parameters it cannot be seen
 EXPLAINED = 1.2  # held-out residual over noise up to which a model counts as explaining the data
 
@@ -123,26 +126,39 @@ def _judged(plant: Plant, model: Tried) -> Verdict:
 
 def _select(plant: Plant, state: _State, progress: Progress) -> None:
     """Forward selection until the residual is noise, nothing helps, or enough kinds are in the model."""
+    plain = state.model
     while not _judged(plant, state.model).is_noise:
         trials = _round(plant, state, state.model, progress)
         best = choice(trials, state.model) if trials else None
         if best is None or not is_worth_it(trials[best], state.model):
             return
         candidate = trials[best].accepted[-1]
+        if candidate.is_structure and _is_explained(plant, plain, state.model):
+            return  # what the wrong form of a law leaves needs no cause of its own
         kinds = {c.effect for c in state.model.accepted if c.is_structure == candidate.is_structure}
         if candidate.effect not in kinds and len(kinds) >= (MAX_TERMS if candidate.is_structure else MAX_EFFECTS):
+            return
+        if len(state.model.accepted) >= MAX_ADDED:
             return
         state.rounds.append((trials, state.model))
         state.model = trials[best]
 
 
-def _round(plant: Plant, state: _State, model: Tried, progress: Progress) -> dict[str, Tried]:
+def _strongest(trials: dict[str, Tried], before: Tried) -> set[str]:
+    gains = {key: compare(trial, before).gain for key, trial in trials.items()}
+    return set(sorted(gains, key=lambda key: -gains[key])[:N_RIVALS])
+
+
+def _round(
+    plant: Plant, state: _State, model: Tried, progress: Progress, only: set[str] | None = None
+) -> dict[str, Tried]:
     """Everything that could be added to a model: effects of the library, and nameless terms beside them."""
     state.n_rounds += 1
     number = state.n_rounds
 
     def suggest(point: Point, blocks: Sequence[int]) -> Sequence[Candidate]:
-        return [*plant.candidates(point, blocks), *plant.structure(point, blocks)]
+        everything = [*plant.candidates(point, blocks), *plant.structure(point, blocks)]
+        return [c for c in everything if only is None or c.key in only]
 
     trials = one_more(plant, model, suggest, lambda key: progress(f"round {number}: {key}"))
     scale = min((t.scale for t in trials.values()), default=1.0)
@@ -168,7 +184,9 @@ def _revise(plant: Plant, state: _State, progress: Progress) -> None:
             state.rounds[k] = (state.rounds[k][0], reduced)
             k += 1
             continue
-        trials = _round(plant, state, reduced, progress)
+        many = len(reduced.fits[0].free) > MANY
+        rivals = _strongest(state.rounds[k][0], state.rounds[k][1]) if many else None
+        trials = _round(plant, state, reduced, progress, rivals)
         trials[own.key] = state.model
         best = choice(trials, reduced) or own.key
         if best != own.key and compare(trials[best], state.model).is_clear:
@@ -207,6 +225,8 @@ def _effects(plant: Plant, state: _State, point: Any, draw: Any) -> list[dict[st
     if not named:
         return []
     trust = _trust(plant, state)
+    for c in named:  # a law that wants to leave its bounds is not the one that is missing
+        trust[c.key] *= 0.5 if any(_at_bound(f, point[f.name]) for f in c.free) else 1.0
     rounds = dict(zip((c.key for c in accepted), state.rounds, strict=True))
     out = []
     for entry in plant.describe(named, point, draw):
@@ -224,6 +244,12 @@ def _effects(plant: Plant, state: _State, point: Any, draw: Any) -> list[dict[st
             }
         )
     return out
+
+
+def _at_bound(free: Free, value: float) -> bool:
+    """Whether a fitted value leans on its bound, other than the one that switches the effect off."""
+    near = 1e-3 * (free.high - free.low)
+    return value > free.high - near or (value < free.low + near and free.low != 0.0)
 
 
 def _trust(plant: Plant, state: _State) -> dict[str, float]:
@@ -250,7 +276,8 @@ def _trust(plant: Plant, state: _State) -> dict[str, float]:
 
 
 def _weights(trials: dict[str, Tried], before: Tried) -> dict[str, float]:
-    """Share of each explanation in the likelihood of held-out data; gains count no more than their error allows."""
+    """Share of each effect in the likelihood of held-out data; gains count no more than their error allows."""
+    trials = {key: t for key, t in trials.items() if not t.accepted[-1].is_structure}
     scale = min(t.scale for t in trials.values())
     best = best_of(trials, before)
     logs = {}

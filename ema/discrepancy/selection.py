@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .fitting import Fit, best_fit, jacobian, log_likelihood, scale_of
+from .fitting import Fit, best_fit, fit, jacobian, log_likelihood, scale_of
 from .plant import Array, Block, Candidate, Plant, Point
 
 N_FOLDS = 2
 FEW = 4  # parameters up to which all of them are differenced in every iteration
-QUICK = 4  # iterations after which a candidate is rated for the first time
-N_LEADING = 6  # candidates fitted to the end, with all parameters
-LEADING = 0.3  # of the best gain, from which a candidate may still win
+N_LEADING = 3  # candidates fitted with all parameters where slopes were frozen
 MIN_PARTS = 40  # parts over which gains are compared in pairs
 ODDS = 5.0  # difference in log-likelihood (150 : 1) from which one explanation is preferred
 NEARLY_NOISE = 1.1  # scale of a residual below which likelihoods can be taken at their word
@@ -107,18 +105,33 @@ def fit_model(
     models: Sequence[Sequence[Candidate]],
     starts: Sequence[Sequence[Point]],
     frozen: Sequence[Array | None] = (None,) * N_FOLDS,
-    max_iterations: int = 12,
 ) -> Tried:
     """Fit one model (its candidates by fold) on all but one fold each; `starts` and `frozen` slopes by fold."""
     fits: list[Fit] = []
-    held: dict[int, Array] = {}
-    for (blocks, left_out), model, start, known in zip(training(plant), models, starts, frozen, strict=True):
+    parts = training(plant)
+    for (blocks, _), model, start, known in zip(parts, models, starts, frozen, strict=True):
         free = [*plant.base, *(f for c in model for f in c.free)]
-        fitted = best_fit(plant, free, start, blocks, frozen=known, max_iterations=max_iterations)
-        fits.append(fitted)
+        fits.append(best_fit(plant, free, start, blocks, frozen=known))
+    fits = [_helped(plant, own, fits) for own in fits]
+    held: dict[int, Array] = {}
+    for (_, left_out), fitted in zip(parts, fits, strict=True):
         held.update(zip(left_out, plant.residuals([fitted.point], left_out)[0], strict=True))
     ordered = tuple(held[j] for j in range(len(plant.blocks)))
     return Tried(tuple(models[0]), tuple(fits), tuple(tuple(m) for m in models), ordered)
+
+
+def _helped(plant: Plant, own: Fit, fits: Sequence[Fit]) -> Fit:
+    """The fit, begun again where another fold ended if that is better here: dry friction has side minima."""
+    names = [f.name for f in own.free]
+    for other in fits:
+        if other is own or [f.name for f in other.free] != names or not names:
+            continue
+        residuals = plant.residuals([other.point], own.blocks)[0]
+        scale = min(own.scale, scale_of(residuals))
+        here, there = (sum(float(s.sum()) for s in log_likelihood(r, scale)) for r in (own.residuals, residuals))
+        if there > here + 1.0:
+            own = fit(plant, own.free, other.point, own.blocks)
+    return own
 
 
 def base_model(plant: Plant) -> Tried:
@@ -147,10 +160,11 @@ def one_more(
             [{**fitted.point, **start} for start in s[key].starts]
             for fitted, s in zip(model.fits, suggested, strict=True)
         ]
-        out[key] = fit_model(plant, models, starts, frozen, QUICK)
-    for key in _leading(out, model):
-        progress(f"{key}, to the end")
-        out[key] = refitted(plant, out[key])
+        out[key] = fit_model(plant, models, starts, frozen)
+    if any(known is not None for known in frozen):
+        for key in _leading(out, model):
+            progress(f"{key}, all parameters")
+            out[key] = refitted(plant, out[key])
     return out
 
 
@@ -161,7 +175,7 @@ def _leading(trials: dict[str, Tried], model: Tried) -> list[str]:
     scale = min(t.scale for t in trials.values())
     gains = {key: compare(trial, model, scale).gain for key, trial in trials.items()}
     ranked = sorted(gains, key=lambda key: -gains[key])[:N_LEADING]
-    return [key for key in ranked if gains[key] > LEADING * gains[ranked[0]]]
+    return [key for key in ranked if gains[key] > 0.5 * gains[ranked[0]]]
 
 
 def refitted(plant: Plant, tried: Tried) -> Tried:

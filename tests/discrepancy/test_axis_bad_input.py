@@ -14,6 +14,8 @@ PLANT = RotaryAxis(J=5e-5, F_d=0.02, k_t=0.05)
 T = np.arange(0.0, 1.0, 1e-3)
 I = np.sin(9.0 * T)
 W = 20.0 * np.sin(9.0 * T) + 0.01 * np.cos(900.0 * T)
+SHAKEN = np.convolve(np.random.default_rng(0).standard_normal(len(T)), np.hanning(60) / 5.0, mode="same")
+FOLLOWS = 50.0 + np.cumsum(0.05 * SHAKEN - 0.02) / 5e-5 * 1e-3
 
 
 def record(**channels):
@@ -28,6 +30,8 @@ def record(**channels):
         (record(i_q=I, w_m=np.full(len(T), 3.0)), "does not move"),
         (record(i_q=I, w_m=np.clip(W, -15.0, 15.0)), "w_m is clipped at 15 rad/s"),
         (record(i_q=np.clip(I, -0.8, 0.8), w_m=W), "i_q is clipped"),
+        (record(i_q=np.where(T[300] == T, np.nan, I), w_m=W), "i_q is not a number at t = 0.3 s (1 samples)"),
+        (record(i_q=np.roll(SHAKEN, 150), w_m=FOLLOWS), "w_m runs 0.15 s ahead of i_q: the channels are out of step"),
         (Record((Cycle(0, {"t": T[:20], "i_q": I[:20], "w_m": W[:20]}),)), "too short"),
     ],
 )

@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import correlate, savgol_filter
 
 from ema.core.errors import RecordError
 from ema.core.names import CHANNELS
-from ema.core.records import Record, require
+from ema.core.records import Array, Record, require
 from ema.models.axis_config import Axis, LinearAxis
 
 MIN_SAMPLES = 40
+MAX_LAG = 30  # samples; less is a delay that can be examined
+IN_STEP = 0.8  # correlation of the torque that the motion needs with the recorded one
 DRIVE_CHANNEL = {"current": "i_q", "voltage": "u_q", "force": "force", "speed-loop": "w_ref"}
 
 
@@ -49,7 +52,10 @@ def roles(plant: Axis, record: Record) -> Roles:
         raise RecordError(
             f"{record.name}: the axis does not move ({' and '.join(moving)} constant): nothing to compare"
         )
+    _finite(record, (drive, *outputs))
     _not_clipped(record, (drive, *moving))
+    if speed in have and kind in ("current", "force"):
+        _in_step(plant, record, drive, speed)
     return Roles(kind, drive, position if position in have else None, speed if speed in have else None, tuple(outputs))
 
 
@@ -60,6 +66,50 @@ def _kind(plant: Axis, record: Record) -> str:
         constant = all(np.ptp(cycle["u_q"]) == 0.0 and cycle["u_q"][0] != 0.0 for cycle in record)
         return "voltage" if constant else "current"
     return plant.drive
+
+
+def _finite(record: Record, names: tuple[str, ...]) -> None:
+    for cycle in record:
+        for name in names:
+            bad = np.flatnonzero(~np.isfinite(cycle[name]))
+            if bad.size:
+                raise RecordError(
+                    f"{record.name}: {cycle}: {name} is not a number at t = {cycle['t'][bad[0]]:g} s "
+                    f"({bad.size} samples): cut these out or split the cycle there"
+                )
+
+
+def _in_step(plant: Axis, record: Record, drive: str, speed: str) -> None:
+    """The torque that the motion needs must lie over the one that was recorded, not seconds beside it."""
+    best: dict[int, list[float]] = {}
+    for cycle in record:
+        t, w = cycle["t"], cycle[speed]
+        if cycle.n_samples < 4 * MAX_LAG:
+            continue
+        width = min(21, cycle.n_samples // 8 * 2 + 1)
+        smooth = savgol_filter(w, width, 2)
+        need = plant.inertia * np.gradient(smooth, t) + plant.C * smooth + plant.F_d * np.sign(smooth)
+        given = savgol_filter(cycle[drive], width, 2) * (1.0 if drive == "force" else float(plant.k_t or 1.0))
+        need, given = need - need.mean(), given - given.mean()
+        lag = int(np.argmax(correlate(need, given, mode="same"))) - len(need) // 2
+        here, there = _alike(need, given, 0), _alike(need, given, lag)
+        best.setdefault(lag, []).append(there)
+        if abs(lag) <= MAX_LAG or there < IN_STEP or here > 0.5 * IN_STEP:
+            return
+    if best:
+        lag = max(best, key=lambda k: len(best[k]))
+        shift = lag * record.cycles[0].period
+        raise RecordError(
+            f"{record.name}: {speed} runs {abs(shift):.3g} s {'behind' if shift > 0.0 else 'ahead of'} {drive}: the "
+            "channels are out of step; record them on one clock"
+        )
+
+
+def _alike(x: Array, y: Array, lag: int) -> float:
+    """Correlation of x with y shifted by `lag` samples, where they overlap."""
+    a, b = (x[lag:], y[: len(y) - lag]) if lag >= 0 else (x[:lag], y[-lag:])
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / size if size > 0.0 else 0.0
 
 
 def _not_clipped(record: Record, names: tuple[str, ...]) -> None:

@@ -25,6 +25,7 @@ from .windows import START_NOISE, Bench, Window, bench, speed_noise
 
 TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
 RUNAWAY = 1e6  # a window that runs away counts as no worse than this
+FIRST, FIRST_PART = 12, 4  # samples at least, and share of a window, to which its start state is fitted
 H_MAX = 2.5e-4  # [s] longest step of the simulation, unless the record's own period is longer than ten of them
 
 
@@ -88,22 +89,27 @@ class AxisPlant:
         return structure.search(self, point, blocks)
 
     def errors(self, point: Point, blocks: Sequence[int]) -> Errors:
-        """Free-run error of the main output over its rms about the window's mean, pooled over records."""
+        """Free-run error of the main output over its rms about the window's mean, pooled over records.
+
+        The start state of each window is fitted to its first part: what is measured there is noisy, and no fault of the
+        simulation.
+        """
         squares: dict[str, list[tuple[float, float, float, int]]] = {}
         for j, r in zip(blocks, self.free_run(point, blocks), strict=True):
             main = self.main_row(j)
             y = self.windows[j].outputs[main]
+            r, floor = self._started(j, r)
             is_position = not self.windows[j].static and self._bench_of[j].roles.speed is None
             power = float(np.var(y)) if is_position else float(np.mean(y**2))
             squares.setdefault(self.windows[j].group, []).append(
-                (float(np.mean(r[main] ** 2)), float(np.mean(self._floor(j)[main])), power, len(y))
+                (float(np.mean(r[main] ** 2)), float(np.mean(floor[main])), power, len(y))
             )
         shares = []
         for parts in squares.values():
-            error, floor, power, n = np.array(parts).T
-            shares.append((error @ n / (power @ n), floor @ n / (power @ n)))
-        error, floor = np.sqrt(np.mean(shares, axis=0))
-        return Errors(float(error), float(floor))
+            error, noise, power, n = np.array(parts).T
+            shares.append((error @ n / (power @ n), noise @ n / (power @ n)))
+        error, noise = np.sqrt(np.mean(shares, axis=0))
+        return Errors(float(error), float(noise))
 
     def describe(
         self, found: Sequence[Candidate], point: Point, draw: Callable[[int], Sequence[Point]]
@@ -272,15 +278,29 @@ class AxisPlant:
         who = self._bench_of[block].roles
         return who.outputs.index(who.speed) if who.speed in who.outputs and not self.windows[block].static else 0
 
-    def _floor(self, block: int) -> Array:
+    def _started(self, block: int, r: Array) -> tuple[Array, Array]:
+        """Residual less what another start state makes of it, fitted to the window's first part, and its variance."""
         b, w = self._bench_of[block], self.windows[block]
         if w.static:
-            return np.full((1, w.n), b.noise[b.roles.drive].sigma ** 2)
+            return r, np.full((1, w.n), b.noise[b.roles.drive].sigma ** 2)
         H, noise, process, damping, _ = self._noise_model(b, w, turning=False)
-        start = np.square([START_NOISE * self._position_noise(b, w), START_NOISE * self._speed_noise(b, w)])
+        dt = np.append(np.diff(w.t), 0.0)
+        now = np.empty(noise.shape)
+        open_loop_variance(H, noise, process, dt, np.zeros(3), damping, now)
+        late = w.t - w.t[0]
+        fade = np.exp(-damping * late)
+        reach = (1.0 - fade) / damping if damping > 0.0 else late
+        modes = np.stack([H[:, :1] + 0.0 * late, H[:, :1] * reach + H[:, 1:] * fade], axis=2)  # (n_channels, n, 2)
+        first = slice(0, max(FIRST, w.n // FIRST_PART))
+        weight = 1.0 / now[:, first]
+        A = np.einsum("cni,cn,cnj->ij", modes[:, first], weight, modes[:, first])
+        known = b.roles.position is not None
+        A = A if known else A + np.diag([1.0 / self._position_noise(b, w) ** 2, 0.0])
+        covariance = np.linalg.inv(A)
+        start = covariance @ np.einsum("cni,cn,cn->i", modes[:, first], weight, r[:, first])
         out = np.empty(noise.shape)
-        open_loop_variance(H, noise, process, np.append(np.diff(w.t), 0.0), start, damping, out)
-        return out
+        open_loop_variance(H, noise, process, dt, covariance[np.triu_indices(2)], damping, out)
+        return r - modes @ start, out
 
 
 _KERNEL_ROW = {"theta_m": 0, "q": 0, "w_m": 1, "v": 1, "i_q": 2, "u_q": 3}

@@ -122,8 +122,8 @@ def _whiten(residual, gain, rms, H, dt, damping, begin, out):
 
 @njit(cache=True)
 def open_loop_variance(H, noise, process, dt, start, damping, out):
-    """Variance of each output's free-run residual under noise alone (start covariance diagonal `start`)."""
-    p00, p01, p11 = start[0], 0.0, start[1]
+    """Variance of each output's free-run residual under noise alone, from a start covariance (p00, p01, p11)."""
+    p00, p01, p11 = start[0], start[1], start[2]
     for k in range(noise.shape[1]):
         for c in range(noise.shape[0]):
             h0, h1 = H[c, 0], H[c, 1]
