@@ -34,6 +34,16 @@ def test_neither_nothing_nor_a_fault_is_an_effect(hidden, shipped_plant, k):
 
 
 @pytest.mark.slow
+def test_a_motion_that_was_recorded_once_is_held_out(hidden, shipped_plant):
+    """Two motions, one cycle each: what one says of the faults holds on the other."""
+    cycles = hidden.cycles(hidden.Flaws(k1=0.04), 2, 3, motions=(hidden.chirp(), hidden.chirp(0.02, 3.0)))
+    record = Record(tuple(Cycle(number, channels) for number, channels in enumerate(cycles)))
+    findings = examine(shipped_plant, measured(shipped_plant, [record])).findings
+    assert findings.verdict == "adequate"
+    assert findings.gain.k_before[0] == pytest.approx(0.04, abs=0.006)
+
+
+@pytest.mark.slow
 def test_magnet_flux_is_named_from_a_file_and_extends_the_plant(hidden, tmp_path):
     """A weaker magnet reads as three shorted phases until it is named beside them; `extended.yaml` then holds it."""
     write_csv(hide(hidden, flux=-0.06, k1=0.03), tmp_path / "flight.csv")

@@ -22,6 +22,7 @@ from .fit import (
     Free,
     bounded,
     bounds,
+    columns,
     fit,
     moved,
     residuals,
@@ -101,10 +102,10 @@ class Search:
         """Is what `model` leaves on all cycles noise?"""
         cycles = sorted(self.train + self.heldout)
         left = residuals(self.plant, self.noise, model.fit.point, cycles, N_FINAL, FINAL_SEED)
-        cols = [
-            self.noise.motions[m].white(np.array([model.fit.columns[m, f.name] for f in model.fit.free])).T
-            for m in range(self.plant.n_motions)
-        ]
+        frees, motions = model.fit.free, range(self.plant.n_motions)
+        only_heldout = [m for m in motions if any((m, f.name) not in model.fit.columns for f in frees)]
+        known = model.fit.columns | columns(self.plant, frees, model.fit.point, only_heldout)
+        cols = [self.noise.motions[m].white(np.array([known[m, f.name] for f in frees])).T for m in motions]
         return verdict(self.noise, [left[c] for c in cycles], cycles, cols, 1.0 / N_FINAL)
 
     def torques(self, model: Model) -> list[Torque]:
