@@ -8,7 +8,7 @@ import numpy as np
 
 from ema.core.status import Reason, Status
 
-from .nuisance import NuisanceEstimate, Rival
+from .nuisance import Edges, NuisanceEstimate
 from .truncated import Marginals
 
 
@@ -34,8 +34,8 @@ class Estimate:
         Directions of k that this cycle's data leave open (unit vectors).
     nuisance : NuisanceEstimate or None
         What was estimated beside the faults, if the bundle carries nuisance parameters.
-    rivals : tuple of Rival
-        Explanations by other faults and nuisance parameters that fit as well; intervals hold them too.
+    edges : Edges or None
+        How far faults may go while nuisance parameters make up for them; intervals reach as far.
     """
 
     method: str
@@ -51,13 +51,11 @@ class Estimate:
     marginals: Marginals | None = None
     unseparable: tuple[np.ndarray, ...] = ()
     nuisance: NuisanceEstimate | None = None
-    rivals: tuple[Rival, ...] = ()
+    edges: Edges | None = None
 
     def interval(self, level: float) -> np.ndarray:
         """Shortest intervals that hold each fault with probability `level`, shape (6, 2); NaN without an estimate."""
         if self.marginals is None:
             return np.full((len(self.k), 2), np.nan)
         limits = self.marginals.shortest(level)
-        for rival in self.rivals:
-            limits = rival.widened(limits, level, slice(None, len(self.k)))
-        return np.clip(limits, 0.0, 1.0)
+        return limits if self.edges is None else self.edges.widened(limits, level, slice(None, len(self.k)))

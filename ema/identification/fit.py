@@ -11,7 +11,7 @@ from ema.core.status import Reason, Status
 from .estimate import Estimate
 from .measurement import Measurement
 from .noise import NoiseModel
-from .nuisance import N_FAULTS, Nuisance, estimated, rivals
+from .nuisance import N_FAULTS, Edges, Nuisance, estimated, rivals
 from .truncated import Marginals, in_unit_box
 from .weighted import Solution, Whitener, bounded_least_squares, p_value
 
@@ -82,13 +82,15 @@ def concluded(
     full = np.full(len(measurement.i_hat), np.nan)
     full[measurement.valid] = residual
     open_directions = unseparable(covariance)
-    nuisance_estimate, others = None, []
+    nuisance_estimate, edges = None, None
     if len(nuisance):
         A, b = problem.whitened(white, nuisance)
-        others = rivals(nuisance, A, b + A @ problem.x, x, solution.covariance)
+        b = b + A @ problem.x
+        others = rivals(nuisance, A, b, x, solution.covariance)
         differences = [other.x[:N_FAULTS] - answer for other in others]
         open_directions += tuple(d / np.linalg.norm(d) for d in differences)
-        nuisance_estimate = estimated(nuisance, x, solution.covariance, beside, others)
+        edges = Edges(A, b, x, nuisance.bounds, others)
+        nuisance_estimate = estimated(nuisance, x, solution.covariance, beside, edges)
     reasons = Reason(0)
     for reason, applies in (
         (Reason.AT_BOUND, at_bound.any()),
@@ -106,7 +108,7 @@ def concluded(
         status = Status.INVALID
     return Estimate(
         *(method, answer, sd, covariance, chi2, dof, p, full, status, reasons), marginals, open_directions,
-        nuisance_estimate, tuple(others),
+        nuisance_estimate, edges,
     )  # fmt: skip
 
 

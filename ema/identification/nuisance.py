@@ -20,7 +20,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import chdtri, ndtri
 
 from ema.faults import N_FAULTS
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 RULED_OUT = 9.0  # χ² by which another explanation must be worse to be ruled out: three standard deviations
 MATTERS = 0.02  # difference in a fault that an operator would be told of
 MIMICRY = 0.5  # correlation from which a nuisance can be mistaken for a fault
+N_BISECTIONS = 8
 SHAPE = 0.05  # share of an effect's response to which its shape is trusted
 TOGETHER = 0.07  # of a complete failure: faults that look like an effect, all together
 LOOKS_ALIKE = 0.2  # share of an effect's response that no sum of faults explains, below which it looks like faults
@@ -177,7 +178,7 @@ def _likeness(A: np.ndarray, white: Whitener) -> tuple[np.ndarray, np.ndarray, n
 
 
 def estimated(
-    nuisance: Nuisance, x: np.ndarray, covariance: np.ndarray, marginals: Marginals, rivals: Sequence[Rival]
+    nuisance: Nuisance, x: np.ndarray, covariance: np.ndarray, marginals: Marginals, edges: Edges
 ) -> NuisanceEstimate:
     """The part of a solution that is no fault, in physical units.
 
@@ -187,16 +188,13 @@ def estimated(
     covariance : array, shape (6 + m, 6 + m)
     marginals : Marginals
         Of u = (ν - low)/(high - low), shape (m,).
-    rivals : sequence of Rival
-        Other explanations; the intervals hold them too.
     """
     low, high = (side[N_FAULTS:] for side in nuisance.bounds)
     span, s = high - low, nuisance.scale
     mean = low + span * marginals.mean
     sd = s * np.sqrt(span**2 * marginals.variance + (mean - x[N_FAULTS:]) ** 2)
     limits = low[:, None] + span[:, None] * marginals.shortest(0.95)
-    for rival in rivals:
-        limits = rival.widened(limits, 0.95, slice(N_FAULTS, None))
+    limits = edges.widened(limits, 0.95, slice(N_FAULTS, None))
     units = np.concatenate([np.ones(N_FAULTS), s])
     return NuisanceEstimate(
         *(nuisance.names, nuisance.units, nuisance.physical(x[N_FAULTS:]), sd),
@@ -211,12 +209,60 @@ class Rival(NamedTuple):
     x: np.ndarray
     sd: np.ndarray
 
+
+class Edges:
+    """How far each element of x may go while all others make up for it within bounds: the profile of the least squares.
+
+    Where an effect looks like faults, the truth (an effect alone) lies at the edge that the faults' bounds cut out of
+    the distribution, where its marginals have next to no weight. The profile reaches to the edge and as far beyond as
+    the noise does. Other explanations that fit, `rivals`, are within too.
+    """
+
+    def __init__(
+        self,
+        A: np.ndarray,
+        b: np.ndarray,
+        x: np.ndarray,
+        bounds: tuple[np.ndarray, np.ndarray],
+        rivals: Sequence[Rival],
+    ):
+        self._A, self._b, self._x, self._bounds, self._rivals = A, b, x, bounds, rivals
+        self._cost = float(np.sum((b - A @ x) ** 2))
+
     def widened(self, limits: np.ndarray, level: float, part: slice) -> np.ndarray:
-        """Limits (n, 2) of the elements `part`, so far that they hold this explanation too."""
-        reach = ndtri(0.5 + 0.5 * level) * self.sd[part]
-        return np.column_stack(
-            [np.minimum(limits[:, 0], self.x[part] - reach), np.maximum(limits[:, 1], self.x[part] + reach)]
-        )
+        """Limits (n, 2) of the elements `part`, so far that they hold what the profile allows at this level."""
+        rise = chdtri(1.0, 1.0 - level)
+        half = ndtri(0.5 + 0.5 * level)
+        for rival in self._rivals:
+            low, high = (rival.x + side * half * rival.sd for side in (-1.0, 1.0))
+            limits = np.column_stack([np.minimum(limits[:, 0], low[part]), np.maximum(limits[:, 1], high[part])])
+        limits = np.clip(limits, *(side[part][:, None] for side in self._bounds))
+        reached = [
+            [self._reach(j, float(end), rise, bound) for end, bound in zip(ends, bounds, strict=True)]
+            for j, ends, *bounds in zip(
+                range(*part.indices(len(self._x))), limits, *(side[part] for side in self._bounds), strict=True
+            )
+        ]
+        return np.array(reached)
+
+    def _reach(self, j: int, end: float, rise: float, bound: float) -> float:
+        """From the limit `end` outwards, up to `bound`: where the cost has risen by `rise`."""
+        if self._risen(j, end) > rise:
+            return end
+        inside, outside = end, bound
+        if self._risen(j, outside) <= rise:
+            return outside
+        for _ in range(N_BISECTIONS):
+            middle = 0.5 * (inside + outside)
+            inside, outside = (middle, outside) if self._risen(j, middle) <= rise else (inside, middle)
+        return inside
+
+    def _risen(self, j: int, value: float) -> float:
+        low, high = self._bounds
+        others = np.arange(len(self._x)) != j
+        b = self._b - self._A[:, j] * value
+        best = bounded_least_squares(self._A[:, others], b, low[others], high[others]).x
+        return float(np.sum((b - self._A[:, others] @ best) ** 2)) - self._cost
 
 
 def rivals(nuisance: Nuisance, A: np.ndarray, b: np.ndarray, x: np.ndarray, covariance: np.ndarray) -> list[Rival]:
