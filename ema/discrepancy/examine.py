@@ -22,6 +22,7 @@ from .selection import (
     choice,
     compare,
     fit_model,
+    is_nameless,
     is_worth_it,
     one_more,
     silent,
@@ -232,7 +233,7 @@ def _effects(plant: Plant, state: _State, point: Any, draw: Any) -> list[dict[st
     for entry in plant.describe(named, point, draw):
         key = entry.pop("key")
         trials, before = rounds[key]
-        others = {o for o in alike(trials, key, before) if not trials[o].accepted[-1].is_structure}
+        others = {o for o in alike(trials, key, before) if not is_nameless(o, trials[o])}
         others |= set(entry.pop("also", ()))
         confidence = _weights(trials, before)[key] * trust[key] / (1 + entry.pop("n_equal", 0))
         out.append(
@@ -277,7 +278,7 @@ def _trust(plant: Plant, state: _State) -> dict[str, float]:
 
 def _weights(trials: dict[str, Tried], before: Tried) -> dict[str, float]:
     """Share of each effect in the likelihood of held-out data; gains count no more than their error allows."""
-    trials = {key: t for key, t in trials.items() if not t.accepted[-1].is_structure}
+    trials = {key: t for key, t in trials.items() if not is_nameless(key, t)}
     scale = min(t.scale for t in trials.values())
     best = best_of(trials, before)
     logs = {}

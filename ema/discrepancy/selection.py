@@ -189,10 +189,15 @@ def best_of(trials: dict[str, Tried], model: Tried) -> str:
     return max(trials, key=lambda key: compare(trials[key], model, scale).gain)
 
 
+def is_nameless(key: str, trial: Tried) -> bool:
+    """Whether what was tried under `key` (not always the last of the model) is a term of the structure."""
+    return any(c.key == key and c.is_structure for c in trial.accepted)
+
+
 def choice(trials: dict[str, Tried], model: Tried) -> str | None:
     """Key of what to add: the best of the library, unless a nameless term foretells held-out data clearly better."""
-    named = {key: t for key, t in trials.items() if not t.accepted[-1].is_structure}
-    nameless = {key: t for key, t in trials.items() if t.accepted[-1].is_structure}
+    nameless = {key: t for key, t in trials.items() if is_nameless(key, t)}
+    named = {key: t for key, t in trials.items() if key not in nameless}
     if not named or not nameless:
         return best_of(trials, model) if trials else None
     one, other = best_of(named, model), best_of(nameless, model)

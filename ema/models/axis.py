@@ -86,6 +86,7 @@ def simulate(
     starts: Array,
     h_max: float,
     dT: Array | None = None,
+    slide: Array | None = None,
 ) -> Array:
     """Outputs (4, n_times) of all windows: position, speed, current, voltage as the sensors show them.
 
@@ -99,11 +100,14 @@ def simulate(
         True position and speed at each window's first sample.
     dT : array, shape (n_windows,), optional
         Winding temperature less 20 °C. [K]
+    slide : array, shape (n_windows,), optional
+        ±1 where the axis slides that way throughout the window, 0 where it may rest or turn round.
     """
+    slide = np.zeros(len(starts)) if slide is None else slide
     dT = np.zeros(len(starts)) if dT is None else dT
     out = np.empty((len(kernel.OUTPUTS), len(t)))
     kernel.simulate_windows(
-        numbers.z, numbers.lines, numbers.terms, MODES[drive], offsets, t, recorded, starts, dT, h_max, out
+        numbers.z, numbers.lines, numbers.terms, MODES[drive], offsets, t, recorded, starts, slide, dT, h_max, out
     )
     return out
 

@@ -21,6 +21,7 @@ from .axis_layout import row
 from .hooks import combined
 
 CURRENT, VOLTAGE, FORCE, SPEED_LOOP = range(4)
+CREEP = 1e-9  # [rad/s] at least, where the axis is known to slide
 OUTPUTS = ("theta_m", "w_m", "i_q", "u_q")
 
 _cogging = njit(inline="always")(cogging.torque)
@@ -89,7 +90,7 @@ def current_after(i, e, R, L, h):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def simulate_window(z, lines, terms, mode, t, drive, theta, w, h_max, out):
+def simulate_window(z, lines, terms, mode, t, drive, theta, w, slide, h_max, out):
     """Simulate one window from position `theta` and speed `w`.
 
     Parameters
@@ -103,6 +104,8 @@ def simulate_window(z, lines, terms, mode, t, drive, theta, w, h_max, out):
         CURRENT, VOLTAGE, FORCE or SPEED_LOOP: what `drive` is (current, voltage, force, commanded speed).
     t, drive : arrays, shape (n_times,)
         Sample times and the recorded drive; between samples it runs straight (a commanded speed is held).
+    slide : float
+        ±1 where the axis is known to slide that way throughout: friction never turns round nor holds. 0: the full rule.
     h_max : float
         Longest step. [s]
     out : array, shape (4, n_times)
@@ -151,8 +154,12 @@ def simulate_window(z, lines, terms, mode, t, drive, theta, w, h_max, out):
             # positions half a step ahead: second order for everything but friction
             theta_mid = theta + 0.5 * h * w
             tau = tau_m - torques(z, lines, terms, theta_mid, w, i, t_mid)
-            F_s, F_d = friction(z, terms, theta_mid, w, tau, tau_m, i, t_mid)
-            w_next = speed_after(w, tau, F_s, F_d, h / inertia)
+            w_sliding = w if slide == 0.0 else slide * max(w * slide, CREEP)
+            F_s, F_d = friction(z, terms, theta_mid, w_sliding, tau, tau_m, i, t_mid)
+            if slide == 0.0:
+                w_next = speed_after(w, tau, F_s, F_d, h / inertia)
+            else:
+                w_next = w + (tau - F_d * slide) * h / inertia
             theta += 0.5 * h * (w + w_next)
             dw = w_next - w
             w = w_next
@@ -189,12 +196,13 @@ def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def simulate_windows(z, lines, terms, mode, offsets, t, drive, starts, dT, h_max, out):
+def simulate_windows(z, lines, terms, mode, offsets, t, drive, starts, slide, dT, h_max, out):
     """Simulate windows `offsets[j]:offsets[j + 1]` of the concatenated arrays, each from its own start (θ, ω)."""
     for j in range(offsets.shape[0] - 1):
         a, b = offsets[j], offsets[j + 1]
         z[DT] = dT[j]
-        simulate_window(z, lines, terms, mode, t[a:b], drive[a:b], starts[j, 0], starts[j, 1], h_max, out[:, a:b])
+        theta, w = starts[j, 0], starts[j, 1]
+        simulate_window(z, lines, terms, mode, t[a:b], drive[a:b], theta, w, slide[j], h_max, out[:, a:b])
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)

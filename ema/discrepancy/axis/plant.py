@@ -149,7 +149,9 @@ class AxisPlant:
         starts = self._starts(pack, model)
         starts[:, 0] += zero
         drive = pack.bench.roles.kind
-        out = axis.simulate(model, drive, pack.offsets, pack.t, pack.drive, starts, self._step(pack), pack.dT)
+        out = axis.simulate(
+            model, drive, pack.offsets, pack.t, pack.drive, starts, self._step(pack), pack.dT, pack.slide
+        )
         out[0] -= zero
         return out[[_KERNEL_ROW[name] for name in pack.bench.roles.outputs]]
 
@@ -317,6 +319,8 @@ class _Pack:
         self.position = np.concatenate([w.position for w in windows])
         self.outputs = np.concatenate([w.outputs for w in windows], axis=1)
         self.dT = np.array([w.dT for w in windows])
+        ways = [np.unique(np.sign(w.speed)) for w in windows]
+        self.slide = np.array([way[0] if len(way) == 1 else 0.0 for way in ways])
         directions = [w.direction for w in windows if w.direction is not None]
         self.direction = np.concatenate(directions) if directions else None
         self.filter = joined(filters) if filters else None

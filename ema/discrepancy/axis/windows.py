@@ -124,7 +124,8 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
     cuts = _glitches(cycle, who, noise) if who.position is not None and who.speed is not None else np.array([], int)
     gaps = np.flatnonzero(np.diff(t) > 5.0 * dt) + 1
     still = np.abs(speed) < AT_REST * START_NOISE * speed_noise(who, noise, dt)
-    rests = _rests(still | _reversals(speed))
+    margin = HALF if who.speed is not None else 2 * HALF  # over which the smoothed speed mixes rest with motion
+    rests = _rests(still | _reversals(speed), margin)
     edges = np.unique(np.concatenate(([0], cuts, gaps, rests.ravel(), [n]))).astype(int)
     n_window = max(MIN_WINDOW, round(length / dt))
     out = []
@@ -149,14 +150,15 @@ def speed_noise(who: Roles, noise: dict[str, Noise], period: float) -> float:
     return noise[who.speed].sigma if who.speed is not None else noise[str(who.position)].sigma / (HALF * period)
 
 
-def _rests(still: NDArray[np.bool_]) -> NDArray[np.int_]:
-    """Begin and end of each rest, shape (n_rests, 2).
+def _rests(still: NDArray[np.bool_], margin: int) -> NDArray[np.int_]:
+    """Begin and end of each rest with `margin` samples about it, shape (n_rests, 2).
 
     A window ends where the axis comes to rest and the next begins when it moves: when it breaks away depends on a
     torque of which the record has noisy samples, and what follows a breakaway at another moment is no noise.
     """
     edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(int), [0])))).reshape(-1, 2)
-    return edges[edges[:, 1] - edges[:, 0] >= SHORTEST_REST]
+    rests = edges[edges[:, 1] - edges[:, 0] >= SHORTEST_REST]
+    return np.clip(rests + np.array([-margin, margin]), 0, len(still))
 
 
 def _reversals(speed: Array) -> NDArray[np.bool_]:
