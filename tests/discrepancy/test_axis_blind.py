@@ -40,7 +40,6 @@ def test_more_friction_is_fitted_and_not_called_an_effect(axis_bench, hidden_axi
     [
         ("viscous_drag", "coefficient", 0.15),
         ("cogging", "order", 1e-9),
-        ("asymmetric_friction", "asymmetry", 0.05),
         ("speed_delay", "time", 0.05),
         ("magnet_flux", "change", 0.1),
     ],
@@ -55,6 +54,14 @@ def test_a_hidden_effect_is_named_measured_and_held_out_error_falls(
     assert found["parameters"][parameter]["value"] == pytest.approx(truth[name][parameter], rel=tolerance)
     assert outcome.verdict == "explained"
     assert outcome.records[0].rms_after < 1.2
+
+
+@pytest.mark.slow
+def test_a_constant_load_and_unequal_friction_are_one_while_the_axis_slides(axis_bench, hidden_axis):
+    outcome, _ = look(axis_bench, hidden_axis, ["constant_load"], 0)
+    found = outcome.effects[0]
+    assert {found["name"], *found["indistinguishable_from"]} == {"constant_load", "asymmetric_friction"}
+    assert found["confidence"] < 0.9
 
 
 @pytest.mark.slow
