@@ -238,8 +238,9 @@ def _confidence(search: Search, model: Model, effect: str) -> float:
         if len(m.names) > place and m.names[:place] == model.names[:place] and len(m.names) == place + 1:
             best[m.names[place]] = min(m.heldout, best.get(m.names[place], np.inf))
     own = best.get(effect, model.heldout)
-    weights = [np.exp(-0.5 * min(n * (x - own) / max(own, 1.0), 1400.0)) for x in best.values()]
-    return float(0.99 / max(sum(weights), 1.0))
+    least = min(own, *best.values())
+    odds = {name: np.exp(-0.5 * n * (x - least) / max(least, 1.0)) for name, x in {**best, effect: own}.items()}
+    return float(0.99 * odds[effect] / sum(odds.values()))
 
 
 def settled(plant: EmaPlant) -> int:

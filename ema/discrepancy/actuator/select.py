@@ -180,13 +180,19 @@ class Search:
         ]
         refined: dict[str, Model] = {}
         cost = sum(float(r @ r) for r in model.fit.residuals.values())
-        for s in self.screen(model, found):
-            if refined and s.promised > WORTH_A_FIT * cost:
-                break
-            if len(refined) >= N_REFINED or (len(refined) >= N_REFINED_AT_LEAST and self._clear(refined, s.promised)):
-                break
-            if s.candidate.effect not in refined:
+        screened = self.screen(model, found)
+        for s in screened:  # one cause for several faults: tried in any case, since the faults hide what it promises
+            if s.candidate.effect not in refined and self._stands_for_faults(model, s.candidate):
                 refined[s.candidate.effect] = self._refined(model, s)
+        others: dict[str, Model] = {}
+        for s in screened:
+            if (refined or others) and s.promised > WORTH_A_FIT * cost:
+                break
+            if len(others) >= N_REFINED or (len(others) >= N_REFINED_AT_LEAST and self._clear(others, s.promised)):
+                break
+            if s.candidate.effect not in {**refined, **others}:
+                others[s.candidate.effect] = self._refined(model, s)
+        refined |= others
         for name, m in self._close(refined):  # a rival is out only if it leaves more when fitted as well as the best
             again = self.model(m.effects, m.fit.free, m.fit.point, None, 4)
             refined[name] = min(m, again, key=lambda x: x.heldout)
@@ -224,13 +230,18 @@ class Search:
         frees = (*model.fit.free, *s.candidate.frees)
         starts = [s.start, self.start_without(model, s.candidate, FAULTS)]
         start, cost = self._better(starts)
-        faults = [name for name in registry()[s.candidate.effect].mistaken_for if name in FAULTS]
-        if len(faults) > 1 and all(model.fit.point.get(name, 0.0) > K_SEEN for name in faults):
+        if self._stands_for_faults(model, s.candidate):
             # One effect for several faults is the simpler cause; noise in the columns would leave the faults there.
+            faults = [name for name in registry()[s.candidate.effect].mistaken_for if name in FAULTS]
             simpler, simpler_cost = self._better([self.start_without(model, s.candidate, faults)])
             if simpler_cost < NO_WORSE * cost:
                 start = simpler
         return self.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3)
+
+    def _stands_for_faults(self, model: Model, c: Candidate) -> bool:
+        """Whether all of the several faults that the effect can be mistaken for are seen in the model."""
+        faults = [name for name in registry()[c.effect].mistaken_for if name in FAULTS]
+        return len(faults) > 1 and all(model.fit.point.get(name, 0.0) > K_SEEN for name in faults)
 
     def _clear(self, refined: dict[str, Model], promised: float) -> bool:
         """Whether what is left to try promises far less than what was reached."""
