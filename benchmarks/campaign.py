@@ -27,6 +27,7 @@ from ema_offline_builder.executors import executor
 from ema_offline_builder.runs import Plan, latin_hypercube
 
 from ema.core import config, resources
+from ema.identification.nuisance import NONE
 from ema.models import hf
 from ema.models.actuator import Actuator
 from ema.reduction.pod import pod
@@ -92,7 +93,7 @@ def large(n: int, workers: int, scheduler: str | None, folder: Path | None) -> N
 
 def _plan(plant: Actuator, n: int) -> Plan:
     k = latin_hypercube(n, K_MAX, SEED)
-    return Plan(k, SEED + np.arange(n), hf.cold_start(plant, n), {"campaign": slice(0, n)})
+    return Plan(k, SEED + np.arange(n), hf.cold_start(plant, n), {"campaign": slice(0, n)}, NONE)
 
 
 def _timed(work: Callable[[], Any]) -> tuple[float, Any]:
