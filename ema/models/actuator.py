@@ -68,6 +68,11 @@ class Sensors(Settings):
     adc_bits: int = Field(ge=6, le=24, description="bits of the current ADC")
     current_noise: float = quantity("A", "rms noise of the measured currents", ge=0, le=10)
 
+    @property
+    def adc_step(self) -> float:
+        """Resolution of the measured currents. [A]"""
+        return 2.0 * self.adc_range / 2**self.adc_bits
+
 
 class Motion(Settings):
     """The test motion: a chirp of the commanded user position."""

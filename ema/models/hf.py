@@ -239,5 +239,5 @@ def simulate(
 
 def quantised(plant: Actuator, i: np.ndarray) -> np.ndarray:
     """Currents rounded to the ADC's steps. [A]"""
-    step = 2.0 * plant.sensors.adc_range / 2**plant.sensors.adc_bits
+    step = plant.sensors.adc_step
     return step * np.round(i / step)

@@ -31,7 +31,7 @@ def roughness(x: Array) -> float:
 
 def current_noise(plant: Actuator, signals: Sequence[Signals]) -> float:
     """Rms white noise of one measured phase current before its converter, from Σ i_j = 0. [A]"""
-    step = 2.0 * plant.sensors.adc_range / 2**plant.sensors.adc_bits
+    step = plant.sensors.adc_step
     total = np.sqrt(np.mean([roughness(s.i.sum(axis=1)) ** 2 for s in signals]) / 3.0)
     quantised = all(_is_on_grid(s.i, step) for s in signals)
     return float(np.sqrt(max(total**2 - (step**2 / 12.0 if quantised else 0.0), 0.0)))
@@ -82,7 +82,7 @@ def supply_voltage(plant: Actuator, signals: Sequence[Signals]) -> float | None:
 def as_recorded(plant: Actuator, signals: Sequence[Signals]) -> tuple[Actuator, list[str]]:
     """The plant under the conditions of the records where these are others, and what to tell a reader of them."""
     sensors = plant.sensors
-    noise = {"current_noise": (current_noise(plant, signals), 2.0 * sensors.adc_range / 2**sensors.adc_bits, "A")}
+    noise = {"current_noise": (current_noise(plant, signals), sensors.adc_step, "A")}
     position = position_noise(plant, signals)
     if position is not None:
         noise["lvdt_noise"] = position, sensors.lvdt_step, "rad"

@@ -194,7 +194,7 @@ def _check_motion(where: str, s: Signals, plant: Actuator) -> None:
 
 
 def _check_clipping(where: str, s: Signals, plant: Actuator) -> None:
-    step = 2.0 * plant.sensors.adc_range / 2**plant.sensors.adc_bits
+    step = plant.sensors.adc_step
     for j, phase in enumerate("abc"):
         x = np.abs(s.i[0, j])
         top = float(x.max())
