@@ -24,7 +24,7 @@ from .segment import Segment
 from .settings import LogSettings
 
 _MB = 1_000_000
-_PENDING_LIMIT = 8 * _MB  # committed before the flush interval is over
+_PENDING_LIMIT = 8 * _MB  # committed before the flush interval is over; kept of what a full disk refuses
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _logger = logging.getLogger("ema.log")
 
@@ -32,8 +32,8 @@ _logger = logging.getLogger("ema.log")
 class SegmentedLog:
     """Writes messages to segments `PREFIX-TIME-NUMBER.mcap` of a directory.
 
-    While the device refuses writes, what was accepted before is kept and written later, new messages are dropped and
-    counted, and every flush interval a new attempt is made.
+    While the disk is full, up to 8 MB (compressed) are kept and written when there is room. Beyond that, and while the
+    device fails altogether, messages are dropped and counted. Every flush interval a new attempt is made.
 
     Parameters
     ----------
@@ -99,19 +99,21 @@ class SegmentedLog:
 
     def write(self, message: Encoded) -> None:
         """Accept one message, or drop and count it while the device refuses writes."""
-        if self._segment is None or self.state is not LogState.OK:
+        segment = self._open_segment()
+        if segment is None:
             self.dropped += 1
-            return
-        self._segment.add(message)
+        else:
+            segment.add(message)
 
     def frames(self, batch: np.ndarray, bus: str) -> None:
         """Accept frames of one bus, shape (n,), FRAME_DTYPE."""
-        if self._segment is None or self.state is not LogState.OK:
+        segment = self._open_segment()
+        if segment is None:
             self.dropped += len(batch)
             return
         batcher = self._batchers.setdefault(bus, Batcher(bus))
         for content in batcher.add(batch):
-            self.write(schemas.FRAMES.encode(content, content["first_ns"]))
+            segment.add(schemas.FRAMES.encode(content, content["first_ns"]))
 
     def tick(self, t_ns: int, clock: float) -> None:
         """Flush, rotate, prune and retry as far as due: at half the interval, so that the writing fits into it."""
@@ -133,12 +135,18 @@ class SegmentedLog:
         if segment is None:
             return
         try:
-            if self.state is LogState.OK:
-                self._collect_frames(segment)
+            self._collect_frames(segment)
             segment.finish()
         except OSError as error:
             segment.abandon()
             raise LogError(f"{segment.path}: could not be finished ({error.strerror})") from error
+
+    def _open_segment(self) -> Segment | None:
+        """The segment that takes messages now; None where they must be dropped."""
+        segment = self._segment
+        if segment is None or segment.finishing:
+            return None
+        return segment if self.state is LogState.OK or segment.pending < _PENDING_LIMIT else None
 
     def _flush(self, t_ns: int, clock: float) -> None:
         keep_free = int(self.settings.keep_free * _MB)
@@ -153,8 +161,7 @@ class SegmentedLog:
         if self._free_space(self.directory) < keep_free:
             raise OSError(errno.ENOSPC, f"less than {self.settings.keep_free:g} MB left")
         if self._segment is not None:
-            if self.state is LogState.OK:
-                self._collect_frames(self._segment)
+            self._collect_frames(self._segment)
             self._segment.commit()
             if self._is_due(self._segment, clock):
                 self._segment.finish()
@@ -175,6 +182,8 @@ class SegmentedLog:
         self._opened_at = clock
 
     def _collect_frames(self, segment: Segment) -> None:
+        if segment.finishing:
+            return
         for batcher in self._batchers.values():
             for content in batcher.flush():
                 segment.add(schemas.FRAMES.encode(content, content["first_ns"]))

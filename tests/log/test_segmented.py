@@ -92,17 +92,39 @@ def test_a_full_disk_stops_the_log_and_room_resumes_it(tmp_path, make):
     _write(log, make, [2], 1.0)  # cycles 1 and 2 are accepted, their flush fails
     assert log.state is LogState.FULL
     _write(log, make, [3, 4], 2.0)
-    log.frames(make.frames(100), "vcan0")
-    assert log.dropped == 102
+    frames = make.frames(100)
+    log.frames(frames, "vcan0")
+    assert log.dropped == 0
     room[0] = 10**12
     _write(log, make, [], 3.0)
     assert log.state is LogState.OK
     _write(log, make, [5], 4.0)
     log.close()
-    assert _cycles(tmp_path) == [0, 1, 2, 5]
+    assert _cycles(tmp_path) == [0, 1, 2, 3, 4, 5]
     with LogReader(tmp_path) as back:
         (event,) = back.messages(lambda topic: topic == "/event")
-    assert event.content["text"] == "log was full for 2.0 s, 102 frames and messages dropped"
+        assert np.array_equal(np.concatenate([b.frames for b in back.frames()]), frames)
+    assert event.content["text"] == "log was full for 2.0 s, 0 frames and messages dropped"
+
+
+def test_a_disk_full_for_long_costs_what_exceeds_the_backlog_and_it_is_counted(tmp_path, make):
+    room = [10**12]
+    log = _open(tmp_path, lambda directory: room[0], segment_size=1000)
+    _write(log, make, [0], 0.0)
+    room[0] = 0
+    batch, n_batches = make.frames(10_000), 200
+    for n in range(n_batches):
+        log.frames(batch, "vcan0")
+        log.tick(T0, 1.0 + n)
+    assert 0 < log.dropped < n_batches * len(batch)
+    dropped = log.dropped
+    room[0] = 10**12
+    _write(log, make, [], 1000.0)
+    log.close()
+    with LogReader(tmp_path) as back:
+        assert sum(len(b.frames) for b in back.frames()) == n_batches * len(batch) - dropped
+        (event,) = back.messages(lambda topic: topic == "/event")
+    assert f", {dropped} frames and messages dropped" in event.content["text"]
 
 
 def test_a_write_cut_short_by_a_full_disk_is_completed_later(tmp_path, make, monkeypatch):

@@ -53,6 +53,5 @@ def test_disk_full_and_free_again(daemon_on_vcan0, small_disk, tmp_path, vcan0, 
         cycles = [m.content["cycle"] for m in log.messages(lambda topic: topic == "/estimate/0/linear")]
         codes = [m.content["code"] for m in log.messages(lambda topic: topic == "/event")]
         assert log.damage == []
-    assert cycles[0] == 0
-    assert cycles[-1] == 2
+    assert cycles == [0, 1, 2]  # what a full disk refuses is kept for a while
     assert "log_resumed" in codes
