@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +23,17 @@ from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.examine import examine
 from ema.models.axis_config import RotaryAxis
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
-
 CONFIDENT = 0.9
 COLUMNS = ("right", "in two", "in more", "unsure", "with a wrong one", "wrong", "missed")
 NOTHING = "nothing"
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "tests" / "support"))
+
+
+def version() -> str:
+    """The commit these answers are of; `-dirty` where files have changed since."""
+    command = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--exclude=*"]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
 
 
 def look(names, seed):
@@ -35,8 +43,11 @@ def look(names, seed):
 
     bench, truth, rng = hidden_axis.bench_with(names, seed)
     plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [axis_bench.record(bench, rng)], n_threads=1)
+    begun = time.process_time()
     o = examine(plant)
     return {
+        "code": version(),
+        "cpu_s": round(time.process_time() - begun, 1),
         "hidden": "+".join(names) or NOTHING,
         "seed": seed,
         "truth": {name: {key: float(x) for key, x in values.items()} for name, values in truth.items()},
