@@ -37,12 +37,15 @@ def version() -> str:
 
 
 def look(names, seed):
-    """Examine a bench with `names` hidden in it; what was said, as plain numbers."""
+    """Examine a drawn bench with `names` hidden in it; what was said, as plain numbers."""
     import axis_bench
     import hidden_axis
 
-    bench, truth, rng = hidden_axis.bench_with(names, seed)
-    plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [axis_bench.record(bench, rng)], n_threads=1)
+    bench, plant_file, motions = hidden_axis.drawn(seed)
+    F_d = bench.F_d
+    bench, truth, rng = hidden_axis.bench_with(names, seed, bench)
+    record = axis_bench.record(bench, rng, motions=motions)
+    plant = AxisPlant(RotaryAxis.model_validate(plant_file), [record], n_threads=1)
     begun = time.process_time()
     o = examine(plant)
     return {
@@ -51,7 +54,9 @@ def look(names, seed):
         "hidden": "+".join(names) or NOTHING,
         "seed": seed,
         "truth": {name: {key: float(x) for key, x in values.items()} for name, values in truth.items()},
+        "noise": "declared" if "noise" in plant_file else "estimated",
         "verdict": o.verdict,
+        "p_value": o.p_value,
         "effects": [
             [
                 e["name"],
@@ -63,6 +68,7 @@ def look(names, seed):
         ],
         "structure": [term["sentence"] for term in o.structure.get("terms", [])],
         "rms": [o.records[0].rms_before, o.records[0].rms_after],
+        "friction": [o.k_before[0] / F_d - 1.0, o.k_after[0] / F_d - 1.0],
         "error": [o.heldout.err_before, o.heldout.err_after, o.heldout.noise_floor],
     }
 

@@ -6,7 +6,7 @@ Functional forms differ from the library's wherever physics allows, so that find
 from __future__ import annotations
 
 import numpy as np
-from axis_bench import Bench
+from axis_bench import MOTIONS, PLANT, Bench
 
 TORQUE = 0.05  # [N m] rms of the bench's drive torque, about
 F = 0.02  # [N m] friction
@@ -210,10 +210,34 @@ def one_sided_driver(bench, rng):
 OUTSIDE = {f.__name__: f for f in (odd_line, intermittent_drag, hunting, one_sided_driver)}
 
 
-def bench_with(names, seed):
+def drawn(seed):
+    """Another bench for each seed: inertia, friction, noise and motions differ, friction also from its plant file.
+
+    Returns
+    -------
+    bench : Bench
+    plant : dict
+        The plant file, which knows all but the friction; every second one does not know the noise either.
+    motions : array, shape (n_cycles, 3)
+    """
+    rng = np.random.default_rng([seed, 77])
+    bench = Bench()
+    bench.J *= np.exp(rng.uniform(-0.4, 0.4))
+    bench.C *= rng.uniform(0.5, 1.5)
+    bench.F_d *= rng.uniform(0.7, 1.4)
+    bench.F_s = bench.F_d * rng.uniform(1.0, 1.4)
+    bench.noise = {name: rms * np.exp(rng.uniform(-0.7, 0.5)) for name, rms in bench.noise.items()}
+    motions = np.array(MOTIONS) * [rng.uniform(0.7, 1.4), rng.uniform(0.8, 1.25), rng.uniform(0.7, 1.4)]
+    plant = {**PLANT, "J": bench.J, "C": bench.C, "noise": dict(bench.noise)}
+    if rng.random() < 0.5:
+        del plant["noise"]
+    return bench, plant, motions
+
+
+def bench_with(names, seed, bench=None):
     """A bench with the named effects hidden in it, and their true parameters."""
     rng = np.random.default_rng([seed, len(names)])
-    bench = Bench()
+    bench = Bench() if bench is None else bench
     truth = {}
     everything = {**LIBRARY, **OUTSIDE}
     torques, frictions = [], []
