@@ -13,6 +13,7 @@ import json
 import subprocess
 import sys
 import time
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "support"))
 
 
+@cache
 def version() -> str:
     """The commit these answers are of; `-dirty` where files have changed since."""
     command = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--exclude=*"]
@@ -130,6 +132,7 @@ def main() -> None:
     parser.add_argument("--log", type=Path)
     parser.add_argument("names", nargs="*", help="effects to hide, several at once as A+B")
     arguments = parser.parse_args()
+    version()  # before files change under a long run
     answers = []
     if arguments.log and arguments.log.exists():
         answers = [json.loads(line) for line in arguments.log.read_text().splitlines()]
