@@ -7,16 +7,14 @@ Resumable: every trial is a line of the results file, and a trial that is there 
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import sys
 import time
-from functools import cache
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import click
+import hidden_actuator as hidden
+import hidden_cases as cases
 import numpy as np
 from scipy.stats import beta
 
@@ -26,24 +24,9 @@ from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.examine import examine
 from ema.models.actuator import Actuator
 
-SUPPORT = Path(__file__).parents[1] / "tests" / "support"
-
-
-@cache
-def support(name: str) -> ModuleType:
-    """A module of tests/support."""
-    spec = importlib.util.spec_from_file_location(name, SUPPORT / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
-
 
 def trial(name: str, seed: int, n_cycles: int, *, varied: bool = True, n_threads: int = 2) -> dict[str, Any]:
     """One hidden flaw, found or not."""
-    hidden, cases = support("hidden_actuator"), support("hidden_cases")
     values, k = cases.draw(name, seed)
     flaws = hidden.Flaws(**values, **{f"k{j + 1}": x for j, x in enumerate(k)})
     motions, bench = cases.draw_bench(hidden, name, seed) if varied else (hidden.MOTIONS, hidden.Bench())
@@ -109,7 +92,7 @@ def main(seeds: int, first: int, only: tuple[str, ...], cycles: int, varied: boo
     rows = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
     done = {(row["case"], row["seed"]) for row in rows}
     for seed in range(first, first + seeds):
-        for name in only or support("hidden_cases").CASES:
+        for name in only or cases.CASES:
             if (name, seed) not in done:
                 row = trial(name, seed, cycles, varied=varied, n_threads=threads)
                 rows.append(row)

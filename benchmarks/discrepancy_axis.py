@@ -10,16 +10,16 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
-import sys
 import time
-from functools import cache
 from pathlib import Path
 from typing import Any
 
+import axis_bench
+import hidden_axis
 import numpy as np
 from scipy import stats
 
+from ema.core.version import version
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.examine import examine
 from ema.models.axis_config import RotaryAxis
@@ -27,22 +27,10 @@ from ema.models.axis_config import RotaryAxis
 CONFIDENT = 0.9
 COLUMNS = ("right", "in two", "in more", "unsure", "with a wrong one", "wrong", "missed")
 NOTHING = "nothing"
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "support"))
-
-
-@cache
-def version() -> str:
-    """The commit these answers are of; `-dirty` where files have changed since."""
-    command = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--exclude=*"]
-    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
 
 
 def look(names, seed):
     """Examine a drawn bench with `names` hidden in it; what was said, as plain numbers."""
-    import axis_bench
-    import hidden_axis
-
     bench, plant_file, motions = hidden_axis.drawn(seed)
     F_d = bench.F_d
     bench, truth, rng = hidden_axis.bench_with(names, seed, bench)
@@ -101,8 +89,6 @@ def rate_outside(answer: dict[str, Any]) -> str:
 
 def table(answers: list[dict[str, Any]]) -> None:
     """Print what was found."""
-    import hidden_axis
-
     none = [a for a in answers if a["hidden"] == NOTHING]
     if none:
         alarms = sum(a["verdict"] != "adequate" for a in none)
@@ -123,8 +109,6 @@ def table(answers: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    import hidden_axis
-
     parser = argparse.ArgumentParser()
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--none", type=int, default=100)

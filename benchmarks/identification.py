@@ -11,9 +11,9 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
+import hidden_actuator as hidden
 import numpy as np
 import platformdirs
 from ema_offline_builder import build
@@ -25,8 +25,6 @@ from ema.identification import Measurement, identifier
 from ema.models import hf
 from ema.models.envelope import envelope
 from ema.models.jit import equations_digest
-
-from .discrepancy import support
 
 SEED = 5
 SETS = (0.05, 0.1, 0.3, 0.5)
@@ -90,14 +88,14 @@ def _rows(b: bundle.Bundle, method: str, name: str, k: np.ndarray, cycles: list[
 
 def independent(b: bundle.Bundle, carried: bool) -> tuple[np.ndarray, list[Measurement]]:
     """Fault vectors (40, 6), every other with one fault alone, and what another program's actuator shows of them."""
-    hidden, rng = support("hidden_actuator"), np.random.default_rng(SEED)
+    rng = np.random.default_rng(SEED)
     k = rng.uniform(0.0, 0.15, (N_INDEPENDENT, 6))
     for n in range(0, N_INDEPENDENT, 2):
         k[n] = np.where(np.arange(6) == n // 2 % 6, rng.uniform(0.0, 0.4), 0.0)
-    return k, [_cycle(b, hidden, row, n, carried) for n, row in enumerate(k)]
+    return k, [_cycle(b, row, n, carried) for n, row in enumerate(k)]
 
 
-def _cycle(b: bundle.Bundle, hidden: ModuleType, k: np.ndarray, seed: int, carried: bool) -> Measurement:
+def _cycle(b: bundle.Bundle, k: np.ndarray, seed: int, carried: bool) -> Measurement:
     flaws = hidden.Flaws(*k)
     record = hidden.cycles(flaws, 2 if carried else 1, seed + SEED * 1000, (b.plant.command(),))[-1]
     i = np.array([record[name] for name in ("i_a", "i_b", "i_c")])

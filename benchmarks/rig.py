@@ -7,8 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
@@ -19,6 +18,7 @@ from ema_simulator.traffic import Traffic
 from ema import bundle as bundles
 from ema.bus import codec as codecs
 from ema.bus.interface import BusSettings, open_bus
+from ema.core.closing import Closing
 
 EMA = Path(sys.executable).with_name("ema")
 N_DIFFERENT = 8  # simulated cycles, sent again and again under new numbers
@@ -44,7 +44,7 @@ def figures(pid: int) -> Figures:
     return Figures(rss, len(os.listdir(f"/proc/{pid}/fd")), int(fields[17]), cpu)
 
 
-class Rig:
+class Rig(Closing):
     """Actuator 0 on the bus and a daemon, which can be started, killed and started again in the same log directory.
 
     Parameters
@@ -129,12 +129,8 @@ class Rig:
             if any(not until or name == until for name, _, _ in heard) or time.monotonic() >= end:
                 return heard
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Kill the daemon if it runs, and leave the bus."""
         if self._process and self._process.poll() is None:
             self._process.kill()
             self._process.wait()

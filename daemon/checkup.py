@@ -11,19 +11,21 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
-from importlib.metadata import PackageNotFoundError, version
+from importlib import metadata
 from pathlib import Path
 
+from ema.bundle import Bundle
 from ema.bus.interface import BusSettings, open_bus
 from ema.bus.port import RECEIVE_BUFFER
 from ema.core.errors import EmaError
+from ema.core.version import version
 
 from .settings import load, load_bundles
 
 _FD_MTU = 72
 _ARPHRD_CAN = "280"
 _TIME_ERROR = 5  # of adjtimex: the clock is not synchronised
-_PACKAGES = ("ema-monitor", "numpy", "scipy", "python-can", "cantools", "mcap", "autosar-e2e", "cryptography")
+_PACKAGES = ("numpy", "scipy", "python-can", "cantools", "mcap", "autosar-e2e", "cryptography")
 _MB = 1_000_000
 
 
@@ -59,13 +61,13 @@ def checkup(config_path: Path | None, bus: BusSettings | None) -> Iterator[Findi
 
 
 def _software() -> Finding:
-    versions = []
+    versions = [f"Python {sys.version.split()[0]}", f"ema-monitor {version()}"]
     for package in _PACKAGES:
         try:
-            versions.append(f"{package} {version(package)}")
-        except PackageNotFoundError:
+            versions.append(f"{package} {metadata.version(package)}")
+        except metadata.PackageNotFoundError:
             return Finding("software", Verdict.BAD, f"{package} is not installed", f"pip install {package}")
-    return Finding("software", Verdict.OK, ", ".join([f"Python {sys.version.split()[0]}", *versions]))
+    return Finding("software", Verdict.OK, ", ".join(versions))
 
 
 def _can() -> Iterator[Finding]:
@@ -149,11 +151,18 @@ def _configuration(path: Path) -> Iterator[Finding]:
     yield Finding("configuration", Verdict.OK, f"{path}: {len(settings.actuators)} actuators")
     try:
         bundles = load_bundles(settings)
-        made = sorted({f"{bundle.path} by {bundle.manifest['software']}" for bundle in bundles.values()})
+        made = sorted({_bundle(bundle) for bundle in bundles.values()})
         yield Finding("bundles", Verdict.OK, "; ".join(made))
     except EmaError as error:
         yield Finding("bundles", Verdict.BAD, str(error), "build it for this actuator: ema build --config … --out …")
     yield _log_directory(Path(settings.log.directory), settings.log.keep_free)
+
+
+def _bundle(bundle: Bundle) -> str:
+    said = f"{bundle.path} by {bundle.manifest['software']}"
+    effects = bundle.plant.effects.items()
+    terms = [f"{name} {parameter} = {x:g}" for name, values in effects for parameter, x in values.items()]
+    return f"{said}, extended: {', '.join(terms)}" if terms else said
 
 
 def _log_directory(directory: Path, keep_free: float) -> Finding:

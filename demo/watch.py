@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import time
-from types import TracebackType
-from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from ema.bus import codec
 from ema.bus.interface import open_bus, parse
+from ema.core.closing import Closing
 from ema.core.names import FAULTS
 
 SHOWN_FROM = 0.005  # a fault
 
 
-class Watch:
+class Watch(Closing):
     """Listens to the monitor's frames on the bus, as any other node could."""
 
     def __init__(self, bus: str, n_cycles: int, console: Console):
@@ -27,6 +26,7 @@ class Watch:
             TextColumn("{task.description}"), console=console,
         )  # fmt: skip
         self._task = self._bar.add_task("simulator starts", total=n_cycles)
+        self._bar.start()
 
     def look(self, duration: float) -> None:
         """Show what comes within `duration` [s]."""
@@ -39,12 +39,7 @@ class Watch:
                     seen = " ".join(f"{name} {x:.3f}" for name, x in k if x >= SHOWN_FROM) or "no fault seen"
                     self._bar.update(self._task, advance=len(frames), description=seen)
 
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Leave the terminal and the bus."""
         self._bar.stop()
         self._port.close()

@@ -8,7 +8,6 @@ import os
 import shutil
 from dataclasses import dataclass, fields
 from functools import cached_property
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from ema.core.config import digest, validate
 from ema.core.errors import BundleError
 from ema.core.names import FAULTS
+from ema.core.version import version
 from ema.faults import N_FAULTS
 from ema.identification.known_error import KnownError, n_terms
 from ema.identification.noise import N_START, NoiseModel
@@ -136,7 +136,7 @@ def save(path: Path, plant: Actuator, builder: dict[str, Any], arrays: dict[str,
                 "dtype": str(array.dtype),
             }
         manifest = {
-            "format": FORMAT, "version": VERSION, "software": version("ema-monitor"), "order_of_k": list(FAULTS),
+            "format": FORMAT, "version": VERSION, "software": version(), "order_of_k": list(FAULTS),
             "plant": plant.model_dump(mode="json"), "plant_hash": digest(plant),
             "builder": builder, **facts, "arrays": entries,
         }  # fmt: skip

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import os
 import sys
-from importlib.metadata import entry_points, version
+from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
 import click
 
 from ema.core.errors import EmaError, NegativeAnswer
+from ema.core.version import version
 
 # Before numpy is loaded: matrices here are small, and threads of a linear algebra library that wait for each other cost
 # a linear answer several times its own work. Cores are used by processes and kernels instead.
@@ -32,8 +33,17 @@ class _Programs(click.Group):
         return None
 
 
+def _tell_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
+    """Ask for the version only when it is wanted: in a checkout that takes a call of git."""
+    if wanted:
+        click.echo(f"ema {version()}")
+        ctx.exit()
+
+
 @click.group(cls=_Programs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
-@click.version_option(version("ema-monitor"), prog_name="ema")
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_tell_version, help="Show the version."
+)
 def cli() -> None:
     """Find faults of an electromechanical flight-control actuator in its motor currents."""
 

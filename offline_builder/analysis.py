@@ -107,9 +107,10 @@ def analyse(
         return np.vstack([lf1.simulate(plant, part, tuning)[:, points] for part in parts])
 
     library = lf2.at(points)
+    slope = np.vstack([np.zeros((N_FAULTS, len(points))), N.T])  # LF2 and LF1 know faults, but nothing beside them
     models: dict[str, noise.Model] = {"lf2": lambda x: library(x[:, :N_FAULTS]), "lf1": lf1_at_points}
     for name, model in models.items():
-        known[name] = error = KnownError.fitted(at, i - model(at), noise.KNEE)
+        known[name] = error = KnownError.fitted(at, i - model(at), noise.KNEE, slope)
         levels[name] = noise.model_error(noise.corrected(model, error), sets, S)
     sizes = [float(np.sqrt(np.mean(np.sum(k**2, axis=1)))) for k, _, _ in sets]
 

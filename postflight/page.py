@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
@@ -15,6 +14,7 @@ from markupsafe import Markup
 
 from ema.core.names import FAULT_MEANING, FAULTS
 from ema.core.status import Status
+from ema.core.version import version
 from ema.log import LogReader
 
 from .health import Health, health
@@ -72,7 +72,7 @@ def page(log: LogReader, settings: ReportSettings) -> str:
             unfinished=log.unfinished,
             damage=log.damage,
             software=log.metadata().get("software", "not named in the log"),
-            reporter=f"ema-monitor {version('ema-monitor')}",
+            reporter=f"ema-monitor {version()}",
             bundles=_bundles(attachments),
             daemon_yaml=attachments.get("daemon.yaml", b"").decode(errors="replace"),
             report_yaml=yaml.safe_dump(settings.model_dump(mode="json"), sort_keys=False),
@@ -143,8 +143,21 @@ def _bundles(attachments: dict[str, bytes]) -> list[dict[str, str]]:
                     "software": str(manifest.get("software", "?")),
                     "plant": str(plant.get("name", "?")),
                     "plant_hash": str(manifest.get("plant_hash", "?")),
+                    "extension": _extension(plant.get("effects", {})),
                 }
             )
         except (ValueError, AttributeError):
-            found.append({"name": name, "software": "?", "plant": "damaged", "plant_hash": "?"})
+            found.append({"name": name, "software": "?", "plant": "damaged", "plant_hash": "?", "extension": ""})
     return found
+
+
+def _extension(effects: dict[str, dict[str, float]]) -> str:
+    """What the plant has beyond the nominal model, in words."""
+    if not effects:
+        return ""
+    from ema.effects import registry  # needs a JIT: only where there is something to say
+
+    known = registry()
+    return "; ".join(
+        known[name].said(values) if name in known else f"{name}, unknown here" for name, values in effects.items()
+    )

@@ -6,7 +6,6 @@ import csv
 import json
 import time
 from contextlib import ExitStack
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import click
 
 from ema.core.errors import LogError, NegativeAnswer
 from ema.core.names import FAULTS
+from ema.core.version import version
 from ema.log import LogReader, Message
 from ema.log.schemas import ESTIMATE
 from ema.log.segment import Segment
@@ -62,7 +62,7 @@ def run(
         made_by = log.metadata().get("software", "an unknown version") if isinstance(log, LogReader) else ""
         raise NegativeAnswer(
             f"{comparison.n_different} estimates differ from the log's by up to {largest:.2g} in k, though the bundle "
-            f"is the same (log made by {made_by}, identified by {version('ema-monitor')})"
+            f"is the same (log made by {made_by}, identified by {version()})"
         )
 
 

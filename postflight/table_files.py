@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from ema.core.closing import Closing
 from ema.core.errors import LogError
 
 from .tables import Block
 
 
-class TableFiles:
+class TableFiles(Closing):
     """One new file for each table in a directory; blocks are appended as they come.
 
     The header names each column with its unit. Parquet columns also carry the unit as metadata of their field.
@@ -38,12 +38,8 @@ class TableFiles:
             raise LogError(f"{path}: cannot be written ({error.strerror or error})") from error
         self.rows[path] += len(block.values[0])
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Finish all files."""
         for file in self._files.values():
             file.close()
 

@@ -41,7 +41,7 @@ class Fleet:
     def __init__(self, scenario: Scenario, plant: Actuator):
         self._scenario = scenario
         self._plant = plant
-        self._effects = _by_lane([a.effects for a in scenario.actuators])
+        self._effects = _by_lane([a.effects for a in scenario.actuators], plant)
         self._state = hf.cold_start(plant, len(scenario.actuators))
         self._command = plant.command()
         self._way_back = _return_command(self._command[-1], scenario.return_time, plant.control.rate)
@@ -83,13 +83,14 @@ def _return_command(theta: float, duration: float, rate: float) -> np.ndarray:
     return theta * 0.5 * (1.0 + np.cos(np.pi * np.minimum(1.0, t / (duration * 2 / 3))))
 
 
-def _by_lane(effects: Sequence[dict[str, dict[str, float]]]) -> dict[str, dict[str, np.ndarray]]:
-    """One array over the lanes for each effect parameter that some lane has; the others' are neutral."""
+def _by_lane(effects: Sequence[dict[str, dict[str, float]]], plant: Actuator) -> dict[str, dict[str, np.ndarray]]:
+    """All parameters of the effects that some lane has, an array over the lanes each; the others' are the plant's."""
     merged: dict[str, dict[str, np.ndarray]] = {}
     for lane, own in enumerate(effects):
         for name, values in own.items():
-            neutral = registry()[name].neutral()
+            if name not in merged:
+                common = {**registry()[name].neutral(), **plant.effects.get(name, {})}
+                merged[name] = {parameter: np.full(len(effects), value) for parameter, value in common.items()}
             for parameter, value in values.items():
-                array = merged.setdefault(name, {}).setdefault(parameter, np.full(len(effects), neutral[parameter]))
-                array[lane] = value
+                merged[name][parameter][lane] = value
     return merged

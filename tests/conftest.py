@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import os
-import sys
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the daemon: on thirty equations threads only spin
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -77,25 +75,14 @@ def flux_bundle(shipped_plant, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def support() -> Callable[[str], ModuleType]:
-    """Loads a module of tests/support by its name."""
-    return _support
+    """Loads a module of tests/support by its name (`pythonpath` in pyproject.toml)."""
+    return importlib.import_module
 
 
 @pytest.fixture(scope="session")
 def hidden(support) -> ModuleType:
     """The independent actuator with flaws to hide (tests/support/hidden_actuator.py)."""
     return support("hidden_actuator")
-
-
-def _support(name: str) -> ModuleType:
-    path = Path(__file__).parent / "support" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="session")

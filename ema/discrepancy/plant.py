@@ -84,16 +84,6 @@ class Errors:
     noise_floor: float
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """A value with its interval."""
-
-    value: float
-    low: float
-    high: float
-    unit: str
-
-
 class Plant(Protocol):
     """A plant with its records, see the package's description."""
 
@@ -131,7 +121,9 @@ class Plant(Protocol):
     def describe(
         self, candidates: Sequence[Candidate], point: Point, draw: Callable[[int], Sequence[Point]]
     ) -> list[dict[str, Any]]:
-        """What was found, for findings.json: name, sentence, parameters as Quantity. `draw` samples the uncertainty."""
+        """What was found, for findings.json: name, sentence, parameters with intervals. `draw` samples the
+        uncertainty.
+        """
         ...
 
     def describe_structure(self, terms: Sequence[Candidate], point: Point) -> dict[str, Any]:

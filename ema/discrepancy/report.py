@@ -6,11 +6,12 @@ import base64
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import jinja2
+
+from ema.core.version import version
 
 from .findings import Findings
 
@@ -53,6 +54,6 @@ def write_report(
         g=findings.gain,
         sentences=findings.sentences(),
         pictures=pictures,
-        software=version("ema-monitor"),
+        software=version(),
     )
     path.write_text(html, encoding="utf-8")

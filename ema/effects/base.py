@@ -65,6 +65,8 @@ class Effect:
     ----------
     sentence : str
         What an engineer would say, with the parameters' names in braces.
+    besides : mapping of str to str
+        What is added to the sentence where the parameter of that name is not neutral.
     mistaken_for : tuple of str
         Faults a monitor without this effect would report.
     separated_by : str
@@ -80,6 +82,7 @@ class Effect:
     laws: Mapping[str, Callable[..., float]] = field(default_factory=dict)
     mistaken_for: tuple[str, ...] = ()
     plants: tuple[str, ...] = ("ema",)
+    besides: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         unknown = set(self.laws) - set(HOOKS)
@@ -89,3 +92,10 @@ class Effect:
     def neutral(self) -> dict[str, float]:
         """Values that switch the effect off."""
         return {p.name: p.neutral for p in self.parameters}
+
+    def said(self, values: Mapping[str, float]) -> str:
+        """The sentence with these values; parameters that are not among them are neutral."""
+        neutral = self.neutral()
+        full = {**neutral, **values}
+        besides = [text for name, text in self.besides.items() if full[name] != neutral[name]]
+        return "".join([self.sentence, *besides]).format(**full)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import pi
+
 from .base import Effect, Parameter
 from .vector_math import sin
 
@@ -16,7 +18,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("amplitude", "N m", 0.0, 0.0, 0.1, 0.005, "amplitude of the torque line"),
         Parameter("order", "1/turn", 12.0, 1.0, 240.0, 12.0, "periods per mechanical turn"),
-        Parameter("phase", "rad", 0.0, -3.141592653589793, 3.141592653589793, 0.0, "phase at θ_m = 0"),
+        Parameter("phase", "rad", 0.0, -pi, pi, 0.0, "phase at θ_m = 0"),
     ),
     sentence="cogging torque of {amplitude:.3g} N m with {order:.4g} periods per rotor turn",
     separated_by="slow motion over a full rotor turn, or a standstill map of holding current against angle",

@@ -5,15 +5,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import pi
+
 from .base import Effect, Parameter
+from .cogging import EFFECT as COGGING
 from .cogging import torque
+
+_amplitude, _, _phase = COGGING.parameters
 
 EFFECT = Effect(
     name="torque_line",
     parameters=(
-        Parameter("amplitude", "N m", 0.0, 0.0, 0.1, 0.005, "amplitude of the torque line"),
+        _amplitude,
         Parameter("order", "1/turn", 7.5, 0.1, 240.0, 7.5, "periods per mechanical turn"),
-        Parameter("phase", "rad", 0.0, -6.283185307179586, 6.283185307179586, 0.0, "phase at θ_m = 0"),
+        replace(_phase, low=-2.0 * pi, high=2.0 * pi),
     ),
     sentence="a torque line of {amplitude:.3g} N m at {order:.4g} periods per rotor turn, of no known cause",
     separated_by="the gears' numbers of teeth, bearings and couplings: what turns at that order",

@@ -45,11 +45,12 @@ class KnownError:
         return monomials(x) @ self.coefficients
 
     @classmethod
-    def fitted(cls, x: np.ndarray, error: np.ndarray, knee: float) -> KnownError:
+    def fitted(cls, x: np.ndarray, error: np.ndarray, knee: float, slope: np.ndarray) -> KnownError:
         """Ridge regression of `error` (n, n_omega) on `x` (n, d), the ridge by generalised cross-validation [1]_.
 
         What no such polynomial can follow grows with the faults: beyond the size `knee` a run counts less, by
-        (knee/‖x‖)⁴.
+        (knee/‖x‖)⁴. A ridge draws coefficients towards zero; `slope` (d, n_omega), the error's derivative at zero as
+        known beforehand, is what the linear ones are drawn to instead.
 
         References
         ----------
@@ -59,7 +60,7 @@ class KnownError:
         F = monomials(x) * w
         scale = np.linalg.norm(F, axis=0)
         U, s, Vt = np.linalg.svd(F / scale, full_matrices=False)
-        y = error * w
+        y = (error - x @ slope) * w
         c = U.T @ y
         rest = float(np.sum(y**2) - np.sum(c**2))
 
@@ -68,4 +69,6 @@ class KnownError:
             return (rest + float(np.sum((damped[:, None] * c) ** 2))) / (len(x) - np.sum(1.0 - damped)) ** 2
 
         ridge = min(RIDGES, key=gcv)
-        return cls(Vt.T @ ((s / (s**2 + ridge))[:, None] * c) / scale[:, None])
+        coefficients = Vt.T @ ((s / (s**2 + ridge))[:, None] * c) / scale[:, None]
+        coefficients[: len(slope)] += slope  # the first monomials are the elements of x themselves
+        return cls(coefficients)

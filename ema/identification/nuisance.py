@@ -20,6 +20,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.special import chdtri, ndtri
 
 from ema.faults import N_FAULTS
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 RULED_OUT = 9.0  # χ² by which another explanation must be worse to be ruled out: three standard deviations
 MATTERS = 0.02  # difference in a fault that an operator would be told of
 MIMICRY = 0.5  # correlation from which a nuisance can be mistaken for a fault
-N_BISECTIONS = 8
+RESOLUTION = 1e-4  # of the limits of an interval [share of a complete failure]
 SHAPE = 0.05  # share of an effect's response to which its shape is trusted
 TOGETHER = 0.07  # of a complete failure: faults that look like an effect, all together
 LOOKS_ALIKE = 0.2  # share of an effect's response that no sum of faults explains, below which it looks like faults
@@ -216,6 +217,14 @@ class Edges:
     Where an effect looks like faults, the truth (an effect alone) lies at the edge that the faults' bounds cut out of
     the distribution, where its marginals have next to no weight. The profile reaches to the edge and as far beyond as
     the noise does. Other explanations that fit, `rivals`, are within too.
+
+    An element at its true value may push others to their bounds that are free where the fit is best. Noise then has
+    had their directions, too, to make the best fit better: the rise of the sum of squares is χ² with one degree of
+    freedom more for each element newly at a bound (chi-bar-squared [1]_, given the face).
+
+    References
+    ----------
+    .. [1] Shapiro, "Towards a unified theory of inequality constrained testing", Int. Stat. Rev. 56 (1988) 49.
     """
 
     def __init__(
@@ -228,41 +237,45 @@ class Edges:
     ):
         self._A, self._b, self._x, self._bounds, self._rivals = A, b, x, bounds, rivals
         self._cost = float(np.sum((b - A @ x) ** 2))
+        self._n_pinned = int(np.sum((x <= bounds[0]) | (x >= bounds[1])))
 
     def widened(self, limits: np.ndarray, level: float, part: slice) -> np.ndarray:
         """Limits (n, 2) of the elements `part`, so far that they hold what the profile allows at this level."""
-        rise = chdtri(1.0, 1.0 - level)
+        allowed = chdtri(1.0 + np.arange(1 + len(self._x)), 1.0 - level)  # by number newly at a bound
         half = ndtri(0.5 + 0.5 * level)
         for rival in self._rivals:
             low, high = (rival.x + side * half * rival.sd for side in (-1.0, 1.0))
             limits = np.column_stack([np.minimum(limits[:, 0], low[part]), np.maximum(limits[:, 1], high[part])])
         limits = np.clip(limits, *(side[part][:, None] for side in self._bounds))
         reached = [
-            [self._reach(j, float(end), rise, bound) for end, bound in zip(ends, bounds, strict=True)]
+            [self._reach(j, float(end), allowed, bound) for end, bound in zip(ends, bounds, strict=True)]
             for j, ends, *bounds in zip(
                 range(*part.indices(len(self._x))), limits, *(side[part] for side in self._bounds), strict=True
             )
         ]
         return np.array(reached)
 
-    def _reach(self, j: int, end: float, rise: float, bound: float) -> float:
-        """From the limit `end` outwards, up to `bound`: where the cost has risen by `rise`."""
-        if self._risen(j, end) > rise:
-            return end
-        inside, outside = end, bound
-        if self._risen(j, outside) <= rise:
-            return outside
-        for _ in range(N_BISECTIONS):
-            middle = 0.5 * (inside + outside)
-            inside, outside = (middle, outside) if self._risen(j, middle) <= rise else (inside, middle)
-        return inside
+    def _reach(self, j: int, end: float, allowed: np.ndarray, bound: float) -> float:
+        """From the limit `end` outwards, up to `bound`: where the cost has risen by as much as is allowed."""
 
-    def _risen(self, j: int, value: float) -> float:
+        def beyond(value: float) -> float:
+            return self._risen(j, value, allowed) - 1.0
+
+        if beyond(end) > 0.0:
+            return end
+        if beyond(bound) <= 0.0:
+            return bound
+        return float(brentq(beyond, end, bound, xtol=RESOLUTION))
+
+    def _risen(self, j: int, value: float, allowed: np.ndarray) -> float:
+        """How far the standard deviation allowed is used up when element `j` has this value; 1 at the edge."""
         low, high = self._bounds
         others = np.arange(len(self._x)) != j
         b = self._b - self._A[:, j] * value
         best = bounded_least_squares(self._A[:, others], b, low[others], high[others]).x
-        return float(np.sum((b - self._A[:, others] @ best) ** 2)) - self._cost
+        rise = max(float(np.sum((b - self._A[:, others] @ best) ** 2)) - self._cost, 0.0)
+        n_pinned = int(np.sum((best <= low[others]) | (best >= high[others])))
+        return float(np.sqrt(rise / allowed[max(n_pinned - self._n_pinned, 0)]))
 
 
 def rivals(nuisance: Nuisance, A: np.ndarray, b: np.ndarray, x: np.ndarray, covariance: np.ndarray) -> list[Rival]:

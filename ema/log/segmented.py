@@ -9,13 +9,13 @@ import errno
 import logging
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
 from ema.core.errors import LogError
 from ema.core.status import LogState
+from ema.core.version import version
 
 from . import contents, retention, schemas
 from .batches import Batcher
@@ -177,7 +177,7 @@ class SegmentedLog:
         self._number += 1
         moment = datetime.fromtimestamp(t_ns / 1e9, UTC)
         name = f"{self._prefix}-{moment:%Y%m%dT%H%M%S}{moment.microsecond // 1000:03d}Z-{self._number:04d}.mcap"
-        metadata = {"software": version("ema-monitor"), **self._metadata, "segment": str(self._number)}
+        metadata = {"software": version(), **self._metadata, "segment": str(self._number)}
         self._segment = Segment(self.directory / name, t_ns, self._attachments, metadata)
         self._opened_at = clock
 

@@ -33,6 +33,9 @@ def test_declaration(effect):
     assert set(effect.mistaken_for) <= set(FAULTS)
     assert set(effect.plants) <= {"ema", "axis"}
     effect.sentence.format(**effect.neutral())
+    assert set(effect.besides) <= set(effect.neutral())
+    assert effect.said({}) == effect.sentence.format(**effect.neutral())
+    assert "{" not in effect.said({p.name: p.start for p in effect.parameters})
     assert effect.separated_by
     for p in effect.parameters:
         assert p.low <= p.neutral <= p.high

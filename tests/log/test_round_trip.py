@@ -1,11 +1,11 @@
 import json
-from importlib.metadata import version
 
 import jsonschema
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 
+from ema.core.version import version
 from ema.log import LogReader, LogWriter, schemas
 
 
@@ -51,7 +51,7 @@ def test_what_is_not_a_number_is_null(log_directory):
 def test_attachments_and_metadata_come_back(log_directory):
     with LogReader(log_directory) as log:
         assert log.attachments() == {"ema.dbc": b"VERSION"}
-        assert log.metadata() == {"software": version("ema-monitor"), "version": "1", "segment": "1"}
+        assert log.metadata() == {"software": version(), "version": "1", "segment": "1"}
 
 
 def test_the_plain_mcap_library_finds_every_channel_with_a_schema_its_messages_obey(log_directory):

@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from ema.cli import cli
+from ema.core.version import version
 
 COMMANDS = sorted(entry.name for entry in entry_points(group="ema.commands"))
 
@@ -22,6 +23,10 @@ def test_help_lists_every_subcommand():
     assert result.exit_code == 0
     for name in COMMANDS:
         assert name in result.output
+
+
+def test_the_version_is_that_of_logs():
+    assert CliRunner().invoke(cli, ["--version"]).output == f"ema {version()}\n"
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from ema.core.version import RELEASE
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
-def names(tmp_path_factory):
+def wheel(tmp_path_factory):
     source = tmp_path_factory.mktemp("source")
     # a copy: setuptools leaves its build folder in the source tree
     subprocess.run(["cp", "-r", *filter(Path.exists, map(ROOT.__truediv__, FOLDERS)), source], check=True)
@@ -31,6 +33,11 @@ def names(tmp_path_factory):
     ]
     subprocess.run(pip, cwd=source, check=True, capture_output=True, timeout=300)
     (wheel,) = (source / "dist").glob("*.whl")
+    return wheel
+
+
+@pytest.fixture(scope="module")
+def names(wheel):
     with zipfile.ZipFile(wheel) as archive:
         return archive.namelist()
 
@@ -39,6 +46,11 @@ FOLDERS = [
     *("ema", "daemon", "offline_builder", "simulator", "postflight", "demo", "dbc", "config", "systemd"),
     *("pyproject.toml", "README.md"),
 ]
+
+
+def test_the_wheel_s_version_is_the_software_s(wheel):
+    """Of a source tree without git: the release alone."""
+    assert wheel.name.startswith(f"ema_monitor-{RELEASE}-")
 
 
 def test_top_level_names_are_our_own(names):

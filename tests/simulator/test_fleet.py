@@ -49,3 +49,13 @@ def test_the_same_scenario_is_the_same_flight(fleet):
     (one, _), (other, _) = fleet(text), fleet(text)
     for _ in range(2):
         assert np.array_equal(one.next_cycle(k).response.i, other.next_cycle(k).response.i)
+
+
+def test_an_actuator_without_an_effect_of_its_own_has_the_plant_s(write, shipped_plant):
+    """A weaker magnet in the plant file stays in every actuator that does not say otherwise."""
+    plant = shipped_plant.model_copy(update={"effects": {"magnet_flux": {"change": -0.1}}})
+    scenario, _ = load(write("actuators: [{}, {number: 1, effects: {magnet_flux: {change: 0.0}}}]\nnoise: false"))
+    i = np.abs(Fleet(scenario, plant).next_cycle(np.zeros((2, 6))).response.envelope).mean(axis=1)
+    nominal = np.abs(Fleet(scenario, shipped_plant).next_cycle(np.zeros((2, 6))).response.envelope).mean(axis=1)
+    assert i[0] / nominal[1] == pytest.approx(1.0 / 0.9, rel=0.02)
+    assert i[1] / nominal[1] == pytest.approx(1.0, rel=0.01)
