@@ -14,5 +14,5 @@ EFFECT = Effect(
     sentence="the gear train gives {compliance:.2g} rad per N m; with {inertia:.2g} kg m² at the user it resonates",
     separated_by="fast motion with both θ_m and θ_u measured",
     mistaken_for=("k2",),
-    plants=("ema",),
+    plants=("ema", "axis"),
 )

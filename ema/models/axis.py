@@ -48,7 +48,7 @@ def model(
     ratio = plant.F_s / plant.F_d if plant.F_s is not None and plant.F_d > 0.0 else 1.0
     values: dict[str, float | None] = {
         **{"J": plant.inertia, "C": plant.C, "F_d": plant.F_d, "F_s": plant.F_s},
-        **{"k_t": plant.k_t, "k_e": plant.k_e, "R": plant.R, "L": plant.L},
+        **{"k_t": plant.k_t, "k_e": plant.k_e, "R": plant.R, "L": plant.L, "V_dc": plant.V_dc},
         **({"K_w": plant.loop.K_w, "I_max": plant.loop.I_max} if plant.loop else {}),
     }
     values |= {"J" if name == "M" else name: value for name, value in changed.items()}
@@ -96,8 +96,9 @@ def simulate(
         What `recorded` is: current, voltage, force, or (speed-loop) commanded speed.
     offsets : array, shape (n_windows + 1,)
         Window j is samples ``offsets[j]:offsets[j + 1]``.
-    starts : array, shape (n_windows, 2)
-        True position and speed at each window's first sample.
+    starts : array, shape (n_windows, 4)
+        True position and speed at each window's first sample, and by how much the load behind a gear that gives is
+        behind in position and speed.
     dT : array, shape (n_windows,), optional
         Winding temperature less 20 °C. [K]
     slide : array, shape (n_windows,), optional
@@ -117,6 +118,17 @@ def holding(numbers: Model, theta: Array, direction: Array, t: Array) -> Array:
     out = np.empty(len(theta))
     kernel.holding_current(numbers.z, numbers.lines, numbers.terms, theta, direction, t, out)
     return out
+
+
+def is_flexible(numbers: Model) -> bool:
+    """Whether the gear gives, so that a window also begins with a twist."""
+    return bool(numbers.z[row("gear_compliance.compliance")] > 0.0)
+
+
+def load_after(numbers: Model, t: Array, theta: Array, h_max: float) -> tuple[float, float]:
+    """Position and speed of the load behind a gear after a recorded motion `theta` of the motor that began at rest."""
+    theta_l, w_l = kernel.load_after(numbers.z, t, theta, h_max)
+    return theta_l, w_l
 
 
 def true_state(numbers: Model, measured: Array) -> Array:

@@ -40,6 +40,7 @@ class Axis(Settings):
     drive: Literal["current", "voltage", "force", "speed-loop"] = "current"
     R: float | None = quantity("ohm", "resistance seen by the drive voltage", None, ge=0, le=1e4)
     L: float | None = quantity("H", "inductance seen by the drive voltage", None, ge=0, le=10)
+    V_dc: float | None = quantity("V", "supply without load, for which u_q is commanded", None, gt=0, le=1e5)
     loop: SpeedLoop | None = None
     fitted: tuple[Literal["J", "M", "C", "k_t", "k_e", "R", "L"], ...] = ()
     noise: Annotated[dict[str, float], BeforeValidator(_noise)] = Field(
@@ -95,6 +96,13 @@ class Axis(Settings):
             raise ValueError(f"drive: {self.drive} needs k_t")
         if self.drive == "speed-loop" and self.loop is None:
             raise ValueError("drive: speed-loop needs loop: {K_w: …}")
+        if "supply_sag" in self.effects and self.V_dc is None:
+            raise ValueError("effect 'supply_sag' needs V_dc, the supply without load")
+        behind = self.effects.get("gear_compliance", {}).get("inertia")
+        if behind is not None and not 0.0 < behind < self.inertia:
+            raise ValueError(
+                f"gear_compliance: the inertia behind the gear, {behind:g}, must be part of {self.inertia:g}"
+            )
         if self.F_s is not None and self.F_s < self.F_d:
             raise ValueError(f"static friction F_s = {self.F_s} must not be below sliding friction F_d = {self.F_d}")
         for name in self.fitted:

@@ -4,6 +4,10 @@
     L di/dt   = u - R i - k_e ω_m                                    where the voltage drives
     i         = sat(K_w (ω_ref - ω_m,measured), ±I_max)              where the speed loop is simulated
 
+A gear that gives (`gear_compliance`) takes the inertia J_l at the user out of J and hangs it to a spring:
+
+    (J - J_l) dω_m/dt = … - T      J_l dω_l/dt = T      T = (θ_m - θ_l)/c + d (ω_m - ω_l)
+
 For a linear axis read position, speed, mass and force; the equations are the same.
 """
 
@@ -13,7 +17,7 @@ import math
 
 from numba import njit
 
-from ema.effects import cogging, torque_term
+from ema.effects import cogging, supply_sag, torque_term
 from ema.effects.dry_friction import speed_after
 
 from . import jit  # noqa: F401  (sets the cache folder before anything is compiled)
@@ -25,6 +29,7 @@ CREEP = 1e-9  # [rad/s] at least, where the axis is known to slide
 OUTPUTS = ("theta_m", "w_m", "i_q", "u_q")
 
 _cogging = njit(inline="always")(cogging.torque)
+_applied, _commanded = supply_sag.applied, supply_sag.commanded
 shaft_torque = combined("shaft_torque", "axis", row)
 user_torque = combined("user_torque", "axis", row)
 static_friction = combined("static_friction", "axis", row)
@@ -40,6 +45,8 @@ INERTIA, GAIN, OFFSET = row("inertia.change"), row("drive_gain.gain"), row("driv
 DROP, SKEW = row("inverter_drop.voltage"), row("clock_skew.rate")
 POSITION_DELAY, SPEED_DELAY = row("position_delay.time"), row("speed_delay.time")
 COGGING = row("cogging.amplitude")
+COMPLIANCE, J_LOAD, ZETA = (row(f"gear_compliance.{name}") for name in ("compliance", "inertia", "damping"))
+SAG, V_DC = row("supply_sag.resistance"), row("V_dc")
 
 
 @njit(inline="always")
@@ -89,9 +96,44 @@ def current_after(i, e, R, L, h):
     return e / R + (i - e / R) * math.exp(-x) if x > 1e-6 else i + h / L * e
 
 
+@njit(inline="always")
+def gear(z, inertia, h):
+    """Stiffness, damping and the load's inertia of a gear that gives; zeros where it is stiff at steps of `h`.
+
+    d = 2 ζ √(J_m J_l / (J_m + J_l) / c)
+    """
+    c, J_l = z[COMPLIANCE], z[J_LOAD]
+    J_m = inertia - J_l
+    if c <= 0.0 or J_m < 0.02 * inertia or h * h * inertia > c * J_m * J_l:
+        return 0.0, 0.0, 0.0
+    return 1.0 / c, 2.0 * z[ZETA] * math.sqrt(J_m * J_l / inertia / c), J_l
+
+
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def simulate_window(z, lines, terms, mode, t, drive, theta, w, slide, h_max, out):
-    """Simulate one window from position `theta` and speed `w`.
+def load_after(z, t, theta, h_max):
+    """Position and speed of the load at the end of a motion `theta` of the motor that began untwisted at rest."""
+    inertia = z[J] * (1.0 + z[INERTIA])
+    theta_l, w_l = theta[0], 0.0
+    for k in range(t.shape[0] - 1):
+        span = t[k + 1] - t[k]
+        n_steps = max(1, math.ceil(span / h_max - 1e-9))
+        h = span / n_steps
+        stiffness, damping, J_l = gear(z, inertia, h)
+        w = (theta[k + 1] - theta[k]) / span
+        if stiffness == 0.0:
+            theta_l, w_l = theta[k + 1], w
+            continue
+        for s in range(n_steps):
+            T = stiffness * (theta[k] + (s + 0.5) * h * w - theta_l - 0.5 * h * w_l) + damping * (w - w_l)
+            theta_l += 0.5 * h * w_l
+            w_l += T * h / J_l
+            theta_l += 0.5 * h * w_l
+    return theta_l, w_l
+
+
+@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
+def simulate_window(z, lines, terms, mode, t, drive, start, slide, h_max, out):
+    """Simulate one window.
 
     Parameters
     ----------
@@ -104,6 +146,8 @@ def simulate_window(z, lines, terms, mode, t, drive, theta, w, slide, h_max, out
         CURRENT, VOLTAGE, FORCE or SPEED_LOOP: what `drive` is (current, voltage, force, commanded speed).
     t, drive : arrays, shape (n_times,)
         Sample times and the recorded drive; between samples it runs straight (a commanded speed is held).
+    start : array, shape (4,)
+        Position, speed, and by how much the load behind a gear that gives is behind in both.
     slide : float
         ±1 where the axis is known to slide that way throughout: friction never turns round nor holds. 0: the full rule.
     h_max : float
@@ -112,7 +156,11 @@ def simulate_window(z, lines, terms, mode, t, drive, theta, w, slide, h_max, out
         Filled with `OUTPUTS` as the sensors show them.
     """
     n = t.shape[0]
+    theta, w = start[0], start[1]
+    theta_l, w_l = theta - start[2], w - start[3]
     inertia = z[J] * (1.0 + z[INERTIA])
+    stiffness, damping, J_l = gear(z, inertia, h_max)
+    J_m = inertia - J_l
     gain = 1.0 / (1.0 + z[GAIN])
     R_now = z[R] * resistance_factor(z, 0, 1, z[DT])
     skew = 1.0 + z[SKEW]
@@ -145,6 +193,8 @@ def simulate_window(z, lines, terms, mode, t, drive, theta, w, slide, h_max, out
                 if mode == VOLTAGE:
                     k_e = z[K_E] * emf_factor(z, 0, 1, i, z[DT])
                     L_now = max(z[L] * inductance_factor(z, 0, 1, i), 1e-12)
+                    if z[SAG] > 0.0:
+                        u = _applied(u, i, z[SAG], z[V_DC])
                     e = u - k_e * (w + 0.5 * dw) - z[DROP] * min(max(i / 1e-2, -1.0), 1.0)
                     i_next = current_after(i, e, R_now, L_now, h)
                     i, i_end = 0.5 * (i + i_next), i_next
@@ -154,12 +204,16 @@ def simulate_window(z, lines, terms, mode, t, drive, theta, w, slide, h_max, out
             # positions half a step ahead: second order for everything but friction
             theta_mid = theta + 0.5 * h * w
             tau = tau_m - torques(z, lines, terms, theta_mid, w, i, t_mid)
+            if stiffness > 0.0:
+                T = stiffness * (theta_mid - theta_l - 0.5 * h * w_l) + damping * (w - w_l)
+                tau -= T
+                theta_l += 0.5 * h * w_l
+                w_l += T * h / J_l
+                theta_l += 0.5 * h * w_l
             w_sliding = w if slide == 0.0 else slide * max(w * slide, CREEP)
             F_s, F_d = friction(z, terms, theta_mid, w_sliding, tau, tau_m, i, t_mid)
-            if slide == 0.0:
-                w_next = speed_after(w, tau, F_s, F_d, h / inertia)
-            else:
-                w_next = w + (tau - F_d * slide) * h / inertia
+            dw = (tau - F_d * slide) * h / J_m
+            w_next = speed_after(w, tau, F_s, F_d, h / J_m) if slide == 0.0 else w + dw
             theta += 0.5 * h * (w + w_next)
             dw = w_next - w
             w = w_next
@@ -183,7 +237,8 @@ def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
         di = (out[2, b] - out[2, a]) / ((t[b] - t[a]) * skew) if b > a else 0.0
         k_e = z[K_E] * emf_factor(z, 0, 1, i, z[DT])
         drop = z[DROP] * min(max(i / 1e-2, -1.0), 1.0)
-        out[3, k] = R_now * i + z[L] * inductance_factor(z, 0, 1, i) * di + k_e * out[1, k] + drop
+        u = R_now * i + z[L] * inductance_factor(z, 0, 1, i) * di + k_e * out[1, k] + drop
+        out[3, k] = _commanded(u, i, z[SAG], z[V_DC]) if z[SAG] > 0.0 else u
     for k in range(n - 1, -1, -1):  # backwards, since the undelayed values of earlier samples are still needed
         w0 = out[1, 0]
         theta = delayed(t, out[0], k, z[POSITION_DELAY], w0) if z[POSITION_DELAY] > 0.0 else out[0, k]
@@ -197,12 +252,11 @@ def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
 def simulate_windows(z, lines, terms, mode, offsets, t, drive, starts, slide, dT, h_max, out):
-    """Simulate windows `offsets[j]:offsets[j + 1]` of the concatenated arrays, each from its own start (θ, ω)."""
+    """Simulate windows `offsets[j]:offsets[j + 1]` of the concatenated arrays, each from its own start."""
     for j in range(offsets.shape[0] - 1):
         a, b = offsets[j], offsets[j + 1]
         z[DT] = dT[j]
-        theta, w = starts[j, 0], starts[j, 1]
-        simulate_window(z, lines, terms, mode, t[a:b], drive[a:b], theta, w, slide[j], h_max, out[:, a:b])
+        simulate_window(z, lines, terms, mode, t[a:b], drive[a:b], starts[j], slide[j], h_max, out[:, a:b])
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)

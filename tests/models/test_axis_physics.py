@@ -14,10 +14,10 @@ T = np.arange(0.0, 0.5, 1e-3)
 FREE = RotaryAxis(J=2e-5, F_d=0.0, k_t=0.05, k_e=0.03, R=0.5, L=3e-4)
 
 
-def run(plant, drive, recorded, *, effects=None, start=(0.0, 0.0), t=T, h=1e-4, **changed):
+def run(plant, drive, recorded, *, effects=None, start=(0.0, 0.0), twist=(0.0, 0.0), t=T, h=1e-4, **changed):
     numbers = axis.model(plant, effects, **changed)
     offsets = np.array([0, len(t)])
-    return axis.simulate(numbers, drive, offsets, t, np.asarray(recorded, float), np.array([start]), h)
+    return axis.simulate(numbers, drive, offsets, t, np.asarray(recorded, float), np.array([[*start, *twist]]), h)
 
 
 def test_constant_current_accelerates_evenly():
@@ -103,6 +103,8 @@ def test_linear_axis_driven_by_force():
         ("kind: axis\nJ: 1e-5\nF_d: 0.01\nk_t: 0.1\neffects: {stribeck: {depth: 1}}\n", "no parameter depth"),
         ("kind: axis\nJ: 1e-5\nF_d: 0.01\nk_t: 0.1\nnoise: {i_z: 1}\n", "unknown channel i_z"),
         ("kind: axis\nJ: 1e-5\nF_d: 0.01\nk_t: 0.1\nfitted: [R]\n", "no value to start from"),
+        ("kind: axis\nJ: 1e-5\nF_d: 0.01\nk_t: 0.1\neffects: {supply_sag: {resistance: 1}}\n", "needs V_dc"),
+        ("kind: axis\nJ: 1e-5\nF_d: 0.01\nk_t: 0.1\neffects: {gear_compliance: {inertia: 2e-5}}\n", "part of 1e-05"),
     ],
 )
 def test_wrong_plant_files_are_refused_in_one_line(tmp_path, text, said):
@@ -112,3 +114,49 @@ def test_wrong_plant_files_are_refused_in_one_line(tmp_path, text, said):
         axis_config.load(path)
     assert said in str(caught.value)
     assert str(path) in str(caught.value)
+
+
+J_M, J_L, C_GEAR = 8e-6, 1.2e-5, 0.6  # together the inertia of FREE
+GEAR = {"gear_compliance": {"compliance": C_GEAR, "inertia": J_L, "damping": 0.0}}
+
+
+def test_a_twisted_gear_swings_at_its_resonance_and_keeps_its_momentum():
+    out = run(FREE, "current", np.zeros(len(T)), effects=GEAR, start=(0.0, 100.0), twist=(0.05, 0.0), h=2.5e-5)
+    resonance = np.sqrt((1.0 / J_M + 1.0 / J_L) / C_GEAR)
+    exact = -0.05 * J_L / (J_M + J_L) * (1.0 - np.cos(resonance * T))  # about the common centre, which rolls on
+    np.testing.assert_allclose(out[0] - 100.0 * T, exact, atol=2e-4)
+
+
+def test_a_gear_that_gives_takes_part_in_the_motion_as_before_when_it_is_slow():
+    i = np.full(len(T), 0.01)
+    soft = {"gear_compliance": {**GEAR["gear_compliance"], "damping": 0.5}}
+    rigid, out = run(FREE, "current", i), run(FREE, "current", i, effects=soft)
+    assert out[1, -1] == pytest.approx(rigid[1, -1], rel=2e-3)
+
+
+def test_the_load_follows_a_recorded_motion_through_the_gear():
+    w = np.sqrt(1.0 / (C_GEAR * J_L))  # of the load against a motor that is held
+    slow = 0.2 * w
+    numbers = axis.model(FREE, {"gear_compliance": {**GEAR["gear_compliance"], "damping": 0.2}})
+    t = np.arange(0.0, 3.0, 1e-4)
+    theta = 1.0 - np.cos(slow * t)
+    theta_l, w_l = axis.load_after(numbers, t, theta, 1e-4)
+    d = 2.0 * 0.2 * np.sqrt(J_M * J_L / (J_M + J_L) / C_GEAR)
+    stiff = 1.0 / C_GEAR + 1j * slow * d
+    response = stiff / (stiff - J_L * slow**2)
+    swing = -response * np.exp(1j * slow * t[-1])
+    assert theta_l == pytest.approx(1.0 + swing.real, abs=2e-3)
+    assert w_l == pytest.approx((1j * slow * swing).real, abs=2e-3 * slow)
+
+
+def test_a_supply_that_sags_leaves_less_to_the_motor_and_asks_for_more():
+    sag = {"supply_sag": {"resistance": 0.8}}
+    plant = FREE.model_copy(update={"V_dc": 6.0})
+    rest = {"start": (0.0, 0.0), "t": T[:3]}
+    i = np.full(3, 2.0)
+    held = plant.model_copy(update={"F_d": 1.0, "F_s": 1.0})
+    u = run(held, "current", i, effects=sag, **rest)[3][1]
+    bus = 6.0 - 0.8 * 2.0 * u / 6.0
+    assert u * bus / 6.0 == pytest.approx(0.5 * 2.0, rel=1e-9)
+    asked = run(held, "voltage", np.full(len(T), u), effects=sag)[2]
+    assert asked[-1] == pytest.approx(2.0, rel=1e-3)

@@ -44,10 +44,14 @@ class Bench:
     torque: Callable = _none  # (theta, w, i, t) → opposing torque
     friction: Callable = _one  # (theta, w, i, t, direction) → factor on friction
     torque_factor: Callable = _one  # (i) → factor on k_t
+    emf_factor: Callable = _one  # (i) → factor on k_e
     measured_theta: Callable = lambda theta, w, t: theta
     measured_w: Callable = lambda theta, w, t: w
     measured_i: Callable = lambda i: i
     voltage: Callable = lambda u, i: u
+    J_load: float = 0.0  # hangs at a shaft that twists
+    shaft: Callable = _none  # (twist, rate of twist) → torque
+    V_dc: float = 8.0
     theta_late: float = 0.0
     w_late: float = 0.0
     clock: float = 1.0
@@ -73,6 +77,7 @@ def record(bench: Bench, rng: np.random.Generator, *, duration: float = 1.5, mot
     h = STEP
     theta = rng.uniform(0.0, 2.0 * np.pi, n_cycles)
     w = np.zeros(n_cycles)
+    load = np.stack([theta, w])
     i = np.zeros(n_cycles)
     kept = {name: np.empty((n, n_cycles)) for name in ("theta", "w", "i", "u")}
     late = round(0.02 / STEP)
@@ -94,14 +99,16 @@ def record(bench: Bench, rng: np.random.Generator, *, duration: float = 1.5, mot
             kept["theta"][s] = bench.measured_theta(th, om, t)
             kept["w"][s] = bench.measured_w(th, om, t)
             kept["i"][s] = bench.measured_i(i)
-            u = bench.R * i + bench.L * slope + bench.k_e * bench.torque_factor(0.0 * i) * w
+            u = bench.R * i + bench.L * slope + bench.k_e * bench.emf_factor(i) * w
             kept["u"][s] = bench.voltage(u, i)
         i_mid = i + 0.5 * h * slope
-        a = _acceleration(bench, theta, w, i_mid, t)
+        a, pull = _acceleration(bench, theta, w, i_mid, t, load)
         w_half = w + 0.5 * h * a
         w_half = np.where(w * w_half < 0.0, 0.0, w_half)
         theta_half = theta + 0.5 * h * w
-        a = _acceleration(bench, theta_half, w_half, i_mid, t + 0.5 * h)
+        load_half = load + 0.5 * h * np.stack([load[1], pull])
+        a, pull = _acceleration(bench, theta_half, w_half, i_mid, t + 0.5 * h, load_half)
+        load = load + h * np.stack([load_half[1], pull])
         w_next = w + h * a
         w_next = np.where(w * w_next < 0.0, 0.0, w_next)
         theta = theta + 0.5 * h * (w + w_next)
@@ -117,14 +124,17 @@ def record(bench: Bench, rng: np.random.Generator, *, duration: float = 1.5, mot
     return Record(tuple(cycles))
 
 
-def _acceleration(bench: Bench, theta, w, i, t):
-    tau = bench.k_t * bench.torque_factor(i) * i - bench.C * w - bench.torque(theta, w, i, t)
+def _acceleration(bench: Bench, theta, w, i, t, load):
+    """Of the motor, and of what hangs at its shaft."""
+    twisting = bench.shaft(theta - load[0], w - load[1]) + 0.0 * w
+    tau = bench.k_t * bench.torque_factor(i) * i - bench.C * w - bench.torque(theta, w, i, t) - twisting
     resting = np.abs(w) < REST
     direction = np.where(resting, np.sign(tau), np.sign(w))
     factor = bench.friction(theta, w, i, t, direction)
     sliding = tau - bench.F_d * factor * direction
     held = np.abs(tau) <= bench.F_s * factor
-    return np.where(resting & held, -w / STEP, sliding) / np.where(resting & held, 1.0, bench.J)
+    a = np.where(resting & held, -w / STEP, sliding) / np.where(resting & held, 1.0, bench.J)
+    return a, twisting / max(bench.J_load, 1e-12)
 
 
 PLANT = {
@@ -138,6 +148,7 @@ PLANT = {
     "k_e": 0.0333,
     "R": 0.5,
     "L": 3e-4,
+    "V_dc": 8.0,
     "drive": "current",
     "noise": {"theta_m": 2e-4, "w_m": 0.05, "i_q": 5e-3, "u_q": 0.02},
 }

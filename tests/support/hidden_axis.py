@@ -92,9 +92,9 @@ def inverter_drop(bench, rng):
 
 
 def saturation(bench, rng):
-    """Torque constant falls by a smooth knee, not by 1/(1 + β i²)."""
+    """Torque per current and voltage per speed (power balance) fall by a smooth knee, not by 1/(1 + β i²)."""
     beta = rng.uniform(0.02, 0.06)
-    bench.torque_factor = lambda i: 1.0 - beta * np.abs(i) ** 2 / np.sqrt(1.0 + (0.25 * i) ** 2)
+    bench.torque_factor = bench.emf_factor = lambda i: 1.0 - beta * np.abs(i) ** 2 / np.sqrt(1.0 + (0.25 * i) ** 2)
     return {"emf": beta}
 
 
@@ -148,6 +148,30 @@ def position_friction(bench, rng):
     return {"height": h, "centre": c}
 
 
+def gear_compliance(bench, rng):
+    """Part of the inertia behind a shaft that stiffens, with a damper that does not know the resonance."""
+    share, f, zeta = rng.uniform(0.3, 0.7), rng.uniform(12.0, 50.0), rng.uniform(0.02, 0.1)
+    bench.J, bench.J_load = (1.0 - share) * bench.J, share * bench.J
+    k = (2.0 * np.pi * f) ** 2 * bench.J_load
+    d = 2.0 * zeta * np.sqrt(k * bench.J_load)
+    bench.shaft = lambda twist, rate: k * twist * (1.0 + 5.0 * twist**2) + d * rate
+    return {"compliance": 1.0 / k, "inertia": bench.J_load}
+
+
+def supply_sag(bench, rng):
+    """The command is raised for a bus that falls with the current it feeds: u (U / U_bus), U_bus by three rounds."""
+    R, U = rng.uniform(0.5, 2.0), bench.V_dc
+
+    def commanded(u, i):
+        bus = U
+        for _ in range(3):
+            bus = U - R * u * i / bus
+        return u * U / bus
+
+    bench.voltage = commanded
+    return {"resistance": R}
+
+
 LIBRARY = {
     f.__name__: f
     for f in (
@@ -171,6 +195,8 @@ LIBRARY = {
         drive_gain,
         drive_offset,
         position_friction,
+        gear_compliance,
+        supply_sag,
     )
 }
 

@@ -8,6 +8,7 @@
 `weak_form`     torque residual along the measured motion, integrated against test functions
 `candidates`    library effects scaled to this axis, with starts
 `cogging`       the order scan
+`gear`          the scan for a resonance of a gear that gives
 `structure`     terms suggested by the torque residual when no effect explains it
 `plant`         all of it as the engine's `Plant`
 ==============  =====================================================================================

@@ -13,6 +13,7 @@ from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
 from .cogging import cogging_candidate
+from .gear import gear_candidate
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -85,8 +86,8 @@ def library(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candi
     """Every effect of the library that has a meaning for this axis and its channels."""
     s = sizes(plant)
     found = [c for name in registry() if (c := _candidate(plant, s, name, point)) is not None]
-    line = cogging_candidate(plant, point, blocks)
-    return found if line is None else [*found, line]
+    searched = (cogging_candidate(plant, point, blocks), gear_candidate(plant, point, blocks))
+    return [*found, *(c for c in searched if c is not None)]
 
 
 def _candidate(plant: AxisPlant, s: Sizes, name: str, point: Point) -> Candidate | None:
@@ -177,6 +178,14 @@ def _drop(plant: AxisPlant, s: Sizes) -> _Spec | None:
     return {"voltage": (0.0, 0.5 * s.voltage, (0.02 * s.voltage,), 0.01 * s.voltage)}
 
 
+def _sag(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    U = plant.plant.V_dc
+    if U is None or not (_has(plant, "u_q") or plant.plant.drive == "voltage"):
+        return None
+    R = U**2 / (s.voltage * s.current)  # at which nothing would be left of the supply
+    return {"resistance": (0.0, 0.2 * R, (0.01 * R,), 0.01 * R)}
+
+
 def _saturation(plant: AxisPlant, s: Sizes) -> _Spec | None:
     if plant.plant.drive == "force":
         return None
@@ -232,6 +241,7 @@ _BUILDERS: dict[str, Callable[[AxisPlant, Sizes], _Spec | None]] = {
     "magnet_flux": _flux,
     "winding_resistance": _resistance,
     "inverter_drop": _drop,
+    "supply_sag": _sag,
     "saturation": _saturation,
     "resolver_error": _resolver,
     "speed_delay": _speed_delay,

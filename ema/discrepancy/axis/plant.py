@@ -146,12 +146,11 @@ class AxisPlant:
         zero = zeros.get(pack.bench.name, 0.0)
         if pack.direction is not None:
             return axis.holding(model, pack.position + zero, pack.direction, pack.t)[None, :]
-        starts = self._starts(pack, model)
+        step = self._step(pack)
+        starts = self._starts(pack, model, step)
         starts[:, 0] += zero
         drive = pack.bench.roles.kind
-        out = axis.simulate(
-            model, drive, pack.offsets, pack.t, pack.drive, starts, self._step(pack), pack.dT, pack.slide
-        )
+        out = axis.simulate(model, drive, pack.offsets, pack.t, pack.drive, starts, step, pack.dT, pack.slide)
         out[0] -= zero
         return out[[_KERNEL_ROW[name] for name in pack.bench.roles.outputs]]
 
@@ -206,17 +205,21 @@ class AxisPlant:
         period = pack.windows[0].period
         return max(period / 10.0, min(period, H_MAX))
 
-    def _starts(self, pack: _Pack, model: axis.Model) -> Array:
-        """True start states: the smoothed measurement, undone for what the model's sensors do."""
+    def _starts(self, pack: _Pack, model: axis.Model, step: float) -> Array:
+        """True start states: the smoothed measurement, undone for what the model's sensors do; the twist of a gear."""
         z = model.z
-        starts = np.empty((len(pack.windows), 2))
+        starts = np.zeros((len(pack.windows), 4))
         late_theta, late_w = z[row("position_delay.time")], z[row("speed_delay.time")]
         if pack.bench.roles.speed is None:
             late_w = late_theta
         for place, w in enumerate(pack.windows):
             starts[place, 0] = w.position[0] if late_theta == 0.0 else np.interp(w.t[0] + late_theta, w.t, w.position)
             starts[place, 1] = w.speed[0] if late_w == 0.0 else np.interp(w.t[0] + late_w, w.t, w.speed)
-        return axis.true_state(model, starts)
+        starts[:, :2] = axis.true_state(model, starts[:, :2])
+        if axis.is_flexible(model):
+            load = np.array([axis.load_after(model, *w.before, step) for w in pack.windows])
+            starts[:, 2:] = np.array([(w.position[0], w.speed[0]) for w in pack.windows]) - load
+        return starts
 
     def _filter(self, b: Bench, w: Window) -> Filter:
         H, noise, process, damping, excursion = self._noise_model(b, w)
