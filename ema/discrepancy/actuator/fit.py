@@ -13,11 +13,12 @@ from ema.effects import registry
 
 from .features import Array
 from .noise import Noise
-from .plant import EmaPlant, Point
+from .plant import EmaPlant, Point, Steps
 
 N_SEEDS = 12  # for a column of the Jacobian, and for the base while searching
 SEED = 1_000_000
 K_STEP = 0.03  # below, the switching noise of a difference is as large as the difference
+TRUSTED = 0.75  # share of the promised gain, below which columns are taken anew
 LENGTH = 150.0  # of a step, in standard deviations of a cycle: four times the noise of one cycle's features
 
 
@@ -89,10 +90,16 @@ class Fit:
 
 
 def residuals(
-    plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int], n_seeds: int = N_SEEDS, seed: int = SEED
+    plant: EmaPlant,
+    noise: Noise,
+    point: Point,
+    cycles: Sequence[int],
+    n_seeds: int = N_SEEDS,
+    seed: int = SEED,
+    steps: Steps = None,
 ) -> dict[int, Array]:
     """Whitened measured less mean simulated features, by cycle."""
-    means = plant.means(point, cycles, n_seeds, seed)
+    means = plant.means(point, cycles, n_seeds, seed, steps)
     return {c: noise.of(c).white(plant.data.y[c] - means[c]) for c in cycles}
 
 
@@ -171,7 +178,7 @@ def fit(
         step, promised = bounded(J, r, *bounds(frees, point))
         if cost - promised < 4.0 * len(frees) and not stale:
             break
-        improved = False
+        improved, gained, before, before_cost = False, 0.0, point, cost
         for share in (1.0, 0.5, 0.2):
             candidate = moved(point, frees, share * step)
             new = residuals(plant, noise, candidate, cycles)
@@ -180,11 +187,10 @@ def fit(
                 gained, improved = cost - new_cost, True
                 point, res, cost = candidate, new, new_cost
                 break
-        if not improved:
-            if all(where == point for where in at.values()):
-                break
+        was_fresh = all(where == before for where in at.values())
+        if not improved or gained < TRUSTED * (before_cost - promised):
             at.clear()  # old columns may be to blame
-        elif gained < 0.001 * cost:
+        if (not improved or gained < 0.001 * cost) and was_fresh:
             break
     information = J.T @ J
     covariance = np.linalg.pinv(information + 1e-12 * np.trace(information) / len(J.T) * np.eye(len(J.T)))

@@ -65,6 +65,8 @@ def resonance(plant: Actuator, data: Measured) -> Resonance | None:
     shafts = [np.ascontiguousarray(s.theta_m[0] / GR) for s in signals]
 
     def misfit(w_0: float, zeta: float, b: float) -> float:
+        if not 0.5 * FREQUENCIES[0] < w_0 < 2.0 * FREQUENCIES[-1] or zeta > 1.0:
+            return np.inf
         total = 0.0
         for shaft, s in zip(shafts, signals, strict=True):
             away = s.theta_u[0] - _user(shaft, float(s.theta_u[0, 0]), w_0, zeta, b, T)

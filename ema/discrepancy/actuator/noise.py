@@ -12,10 +12,9 @@ from scipy.stats import gamma
 from .features import Array
 from .plant import EmaPlant, Point
 
-N_COVARIANCE = 96
-N_NULL = 48
+N_RUNS = 96, 48  # for the covariance, for the null distribution
+N_RUNS_SURE = 288, 192  # where it is close
 SEED = 7_000_000
-STEPS = (1e-6, 5e-7, 8e-7, 2e-6)  # [s]
 FALSE_ALARMS = 0.004  # of the whole verdict; the aim is 1 %, and the null distribution is itself estimated
 
 
@@ -63,7 +62,7 @@ def shrinkage(z: Array) -> float:
     return float(np.clip(variance[off].sum() / max((r[off] ** 2).sum(), 1e-300), 0.02, 1.0))
 
 
-def motion_noise(plant: EmaPlant, point: Point, motion: int) -> MotionNoise:
+def motion_noise(plant: EmaPlant, point: Point, motion: int, n_runs: tuple[int, int] = N_RUNS) -> MotionNoise:
     """Simulate the cycles of a motion many times and describe how runs of one cycle differ.
 
     Beside what is random stands what no record tells: the grid on which the comparators are evaluated. It rounds every
@@ -71,10 +70,10 @@ def motion_noise(plant: EmaPlant, point: Point, motion: int) -> MotionNoise:
     with this step. So runs have several steps, and what the step makes is part of the noise.
     """
     cycles = np.flatnonzero(plant.data.motion == motion)
-    each = -(-(N_COVARIANCE + N_NULL) // len(cycles))
+    each = -(-sum(n_runs) // len(cycles))
     of = np.repeat(cycles, each)
     n = len(of)
-    runs = plant.simulate([point] * n, of.tolist(), range(SEED, SEED + n), steps=STEPS)
+    runs = plant.simulate([point] * n, of.tolist(), range(SEED, SEED + n), steps=plant.noise_steps)
     floor = plant.floors[motion] * np.random.default_rng(SEED).standard_normal((n, len(plant.floors[motion])))
 
     def deviations(x: Array) -> Array:
@@ -83,7 +82,7 @@ def motion_noise(plant: EmaPlant, point: Point, motion: int) -> MotionNoise:
         away = (by_cycle - by_cycle.mean(axis=1, keepdims=True)) * np.sqrt(each / (each - 1.0))
         return away.transpose(1, 0, 2).reshape(n, -1)
 
-    x, new = np.split(deviations(runs.features + floor), [n * N_COVARIANCE // (N_COVARIANCE + N_NULL)])
+    x, new = np.split(deviations(runs.features + floor), [n * n_runs[0] // sum(n_runs)])
     sd = np.sqrt((x**2).mean(axis=0))
     z = x / sd
     correlation = (1.0 - shrinkage(z)) * (z.T @ z / len(z))
@@ -95,9 +94,9 @@ def motion_noise(plant: EmaPlant, point: Point, motion: int) -> MotionNoise:
 class Noise:
     """Noise of every motion near one point."""
 
-    def __init__(self, plant: EmaPlant, point: Point):
+    def __init__(self, plant: EmaPlant, point: Point, n_runs: tuple[int, int] = N_RUNS):
         self.plant, self.point = plant, dict(point)
-        self.motions = [motion_noise(plant, point, m) for m in range(plant.n_motions)]
+        self.motions = [motion_noise(plant, point, m, n_runs) for m in range(plant.n_motions)]
 
     def of(self, cycle: int) -> MotionNoise:
         """Noise of the motion a cycle belongs to."""

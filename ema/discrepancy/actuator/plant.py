@@ -21,7 +21,9 @@ from .cycles import Measured
 from .features import Array, Signals, features, floors, slices, stacked
 
 Point = Mapping[str, float]
+Steps = tuple[float, ...] | None  # None: the plant's
 STEPS = (1e-6, 8e-7)  # [s] integration steps of a mean
+NOISE_STEPS = (1e-6, 5e-7, 8e-7, 2e-6)  # [s] integration steps of runs that tell the noise
 CHUNK = 64  # runs in memory at a time
 ENVELOPE_STEP = 10  # the envelope is low-passed at 200 Hz: every tenth sample says all
 
@@ -47,6 +49,8 @@ class EmaPlant:
     def __init__(self, plant: Actuator, data: Measured, n_threads: int = 2):
         self.plant, self.data, self.n_threads = plant, data, n_threads
         self.n_runs = 0
+        self.steps: tuple[float, ...] = STEPS
+        self.noise_steps: tuple[float, ...] = NOISE_STEPS
         self.n_motions = len(data.commands)
         self.first = [int(np.flatnonzero(data.motion == m)[0]) for m in range(self.n_motions)]
         groups = [features(plant, data.signals[c]) for c in self.first]
@@ -62,12 +66,13 @@ class EmaPlant:
         return float(declared.get(parameter, registry()[effect].neutral()[parameter]))
 
     def simulate(
-        self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], steps: Sequence[float] = STEPS
+        self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], steps: Steps = None
     ) -> Runs:
         """One run for each (point, cycle, seed), given as three sequences of one length; cycles of one motion.
 
         Integration steps take turns with the seeds: what is rounded alike in every run with one step averages out.
         """
+        steps = steps or self.steps
         of = np.array([(seed - seeds[0]) % len(steps) for seed in seeds])
         which = [np.flatnonzero(of == j).tolist() for j in range(len(steps))]
         parts = [
@@ -118,20 +123,20 @@ class EmaPlant:
         self.n_runs += n
         return Runs(np.concatenate(all_features), np.concatenate(all_envelopes))
 
-    def means(self, point: Point, cycles: Sequence[int], n_seeds: int, seed: int) -> dict[int, Array]:
+    def means(
+        self, point: Point, cycles: Sequence[int], n_seeds: int, seed: int, steps: Steps = None
+    ) -> dict[int, Array]:
         """Mean features of several cycles at one point, by cycle; each has its own seeds."""
         found: dict[int, Array] = {}
         for motion in sorted({int(self.data.motion[c]) for c in cycles}):
             same = [c for c in cycles if self.data.motion[c] == motion]
             of = [c for c in same for _ in range(n_seeds)]
             seeds = [seed + 1000 * c + j for c in same for j in range(n_seeds)]
-            runs = self.simulate([point] * len(of), of, seeds)
+            runs = self.simulate([point] * len(of), of, seeds, steps)
             found |= dict(zip(same, runs.features.reshape(len(same), n_seeds, -1).mean(axis=1), strict=True))
         return found
 
-    def mean(
-        self, points: Sequence[Point], cycle: int, n_seeds: int, seed: int, steps: Sequence[float] = STEPS
-    ) -> Array:
+    def mean(self, points: Sequence[Point], cycle: int, n_seeds: int, seed: int, steps: Steps = None) -> Array:
         """Mean features of a cycle at several points, (n_points, n_features). All points share their seeds."""
         grid = [point for point in points for _ in range(n_seeds)]
         seeds = [seed + j for _ in points for j in range(n_seeds)]

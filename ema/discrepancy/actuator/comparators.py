@@ -1,0 +1,37 @@
+"""On which grid the comparators of the record switch: a condition of the bench, not a fault and not an effect.
+
+A hysteresis comparator that is evaluated every Δt switches late by Δt/2 on average, which shifts local means of the
+current by up to a quarter of (slope × Δt), alike in every cycle. No record tells Δt, and none of the nominal steps may
+come near it. So where the nominal ones leave a rest, others are tried on the model as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .fit import N_SEEDS, SEED, residuals
+from .noise import Noise
+from .plant import EmaPlant, Point
+
+STEPS = (2.5e-7, 5e-7, 1e-6, 2e-6, 4e-6)  # [s]
+AROUND = (1.0, 1.25, 0.8)  # times the step, for the noise: what is left unknown of it
+CLEAR = 0.7  # share of what is left that another step may leave to be taken instead
+
+
+def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]) -> float | None:
+    """The integration step with which `point` leaves clearly less of the cycles than now; None if there is none. [s]"""
+
+    def excess(steps: tuple[float, ...] | None) -> float:
+        left = residuals(plant, noise, point, cycles, N_SEEDS, SEED, steps)
+        return max(noise.misfit(list(left.values()), cycles) - 1.0, 0.0)
+
+    now = excess(None)
+    left, best = min((excess((step,)), step) for step in STEPS)
+    return best if left < CLEAR * now else None
+
+
+def take_step(plant: EmaPlant, step: float) -> None:
+    """Simulate with this step from now on, and with its neighbours where noise is asked for."""
+    T = 1.0 / plant.plant.control.rate
+    plant.steps = (step,)
+    plant.noise_steps = tuple(T / round(T / (step * factor)) for factor in AROUND)
