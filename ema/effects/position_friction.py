@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="position_friction",
     parameters=(
         Parameter("height", "1", 0.0, -0.9, 5.0, 0.5, "additional friction at the centre over nominal friction"),
-        Parameter("centre", "rad", 0.0, -0.05, 0.05, 0.0, "user position of the stretch"),
+        Parameter("centre", "rad", 0.0, -0.4, 0.4, 0.0, "user position of the stretch"),
         Parameter("width", "rad", 0.001, 0.0001, 0.01, 0.001, "half width, to 1/e of the height"),
     ),
     sentence="friction changed by {height:+.0%} around θ_u = {centre:.2g} rad, half width {width:.2g} rad",

@@ -113,9 +113,10 @@ class Line(Candidate):
 def _plain(effect: str, *names: str, step: Mapping[str, float] | None = None, **fixed: float) -> Candidate:
     """Linear in `names`; `fixed` are fitted too, from the given values."""
     parameters = {p.name: p for p in registry()[effect].parameters}
-    steps = tuple((step or {}).get(n, parameters[n].start - parameters[n].neutral) for n in names)
+    step = step or {}
+    steps = tuple(step.get(n, parameters[n].start - parameters[n].neutral) for n in names)
     frees = [free(f"{effect}.{n}", s) for n, s in zip(names, steps, strict=True)]
-    frees += [free(f"{effect}.{n}", 0.15 * value or 0.1 * parameters[n].start) for n, value in fixed.items()]
+    frees += [free(f"{effect}.{n}", step.get(n, 0.15 * value)) for n, value in fixed.items()]
     at = tuple(parameters[n].neutral + s for n, s in zip(names, steps, strict=True))
     return Candidate(effect, tuple(frees), fixed, names, at)
 
@@ -165,5 +166,5 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque]) -> li
         )
         found.append(Line("cogging", frees, {"order": order}, ("amplitude",), (0.005,)))
     for centre, width in bumps(torques):
-        found.append(_plain("position_friction", "height", centre=centre, width=width))
+        found.append(_plain("position_friction", "height", step={"centre": 0.25 * width}, centre=centre, width=width))
     return found
