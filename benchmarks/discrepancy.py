@@ -20,9 +20,14 @@ from scipy.stats import beta
 
 from ema.core import config, resources
 from ema.core.records import Cycle, Record
+from ema.core.version import version
 from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.examine import examine
 from ema.models.actuator import Actuator
+
+CONFIDENT = 0.9
+VERSION = version()  # at the start: the tree may change under a long run
+VISIBLE = 1.2  # times what noise makes of the record
 
 
 def trial(name: str, seed: int, n_cycles: int, *, varied: bool = True, n_threads: int = 2) -> dict[str, Any]:
@@ -34,18 +39,33 @@ def trial(name: str, seed: int, n_cycles: int, *, varied: bool = True, n_threads
     plant = config.load(resources.config("actuator.yaml"), Actuator)
     begun = time.process_time()
     findings = examine(plant, measured(plant, [record]), n_threads=n_threads).findings.as_dict()
-    found = {f"{e['name']}.{p}": q["value"] for e in findings["effects"] for p, q in e["parameters"].items()}
-    errors = {p: found[p] / truth(values) - 1.0 for p, truth in cases.CASES[name].parameters.items() if p in found}
+    found = {f"{e['name']}.{p}": q for e in findings["effects"] for p, q in e["parameters"].items()}
+    true = {p: truth(values) for p, truth in cases.CASES[name].parameters.items() if p in found}
     gain = findings["gain"]
+    outcome = cases.outcome(name, findings)
     return {
-        "case": name, "seed": seed, "outcome": cases.outcome(name, findings), "verdict": findings["verdict"],
+        "case": name, "seed": seed, "outcome": outcome, "verdict": findings["verdict"], "version": VERSION,
+        "visible": cases.visibility(hidden, flaws, n_cycles, seed, motions, bench) if outcome == "missed" else None,
         "named": [[e["name"], *e["indistinguishable_from"]] for e in findings["effects"]], "hidden": values, "k": k,
-        "parameter_errors": errors, **gain["heldout"],
+        "confidence": [e["confidence"] for e in findings["effects"]],
+        "parameter_errors": {p: found[p]["value"] / x - 1.0 for p, x in true.items()},
+        "covered": {p: found[p]["low"] <= x <= found[p]["high"] for p, x in true.items()}, **gain["heldout"],
         "err_k_before": _err_k(gain["k_before"], k), "err_k_after": _err_k(gain["k_after"], k),
         "false_alarms": [gain["false_alarms_before"], gain["false_alarms_after"]], "cpu_s": time.process_time() - begun,
         "motions": "varied" if varied else "test chirps", "tried": findings["tried"][:8],
         "said": findings["structure"].get("sentences", []) + findings["notes"],
     }  # fmt: skip
+
+
+def _told(row: dict[str, Any]) -> str:
+    """The outcome; "unseen" where the flaw makes no more of the record than noise does."""
+    unseen = row["outcome"] == "missed" and row["verdict"] == "adequate" and row["visible"] < VISIBLE
+    return "unseen" if unseen else str(row["outcome"])
+
+
+def _rate(count: int, n: int) -> str:
+    low, high = (float(x) for x in beta.interval(0.95, count + 0.5, n - count + 0.5))
+    return f"{count} of {n} ({low:.1%} to {high:.1%})"
 
 
 def _err_k(found: list[float], truth: list[float]) -> float:
@@ -54,26 +74,31 @@ def _err_k(found: list[float], truth: list[float]) -> float:
 
 def table(rows: list[dict[str, Any]]) -> str:
     """The results by case."""
-    head = f"{'hidden':30s} {'n':>3} {'right':>5} {'set':>4} {'wrong':>5} {'missed':>6} {'param.':>7}"
+    head = f"{'hidden':30s} {'n':>3} {'right':>5} {'set':>4} {'wrong':>5} {'missed':>6} {'unseen':>6} {'param.':>7}"
     lines = [head + "  err_i before after floor [mA]  err_k before after"]
     for name in dict.fromkeys(row["case"] for row in rows):
         these = [row for row in rows if row["case"] == name]
-        count = {o: sum(row["outcome"] == o for row in these) for o in ("right", "in set", "wrong", "missed")}
+        count = {o: sum(_told(row) == o for row in these) for o in ("right", "in set", "wrong", "missed", "unseen")}
         parameter = [abs(x) for row in these for x in row["parameter_errors"].values()]
         median = {key: float(np.median([row[key] for row in these]))
                   for key in ("err_before", "err_after", "noise_floor", "err_k_before", "err_k_after")}  # fmt: skip
         lines.append(
             f"{name:30s} {len(these):3d} {count['right']:5d} {count['in set']:4d} {count['wrong']:5d} "
-            f"{count['missed']:6d} {np.median(parameter) if parameter else np.nan:7.1%}  "
+            f"{count['missed']:6d} {count['unseen']:6d} {np.median(parameter) if parameter else np.nan:7.1%}  "
             f"{1e3 * median['err_before']:12.1f} {1e3 * median['err_after']:5.1f} {1e3 * median['noise_floor']:5.1f}"
             f"{'':7s}{median['err_k_before']:12.4f} {median['err_k_after']:.4f}"
         )
     alarms = [row for row in rows if row["case"] in ("none", "faults")]
+    hiding = [row for row in rows if row not in alarms and _told(row) != "unseen"]
+    if hiding:
+        good = sum(row["outcome"] in ("right", "in set") for row in hiding)
+        bad = sum(row["outcome"] == "wrong" and max(row["confidence"], default=0.0) >= CONFIDENT for row in hiding)
+        inside = [x for row in hiding for x in row["covered"].values()]
+        lines.append(f"right or in the set: {_rate(good, len(hiding))}; confidently wrong: {_rate(bad, len(hiding))}")
+        lines.append(f"95 % intervals of parameters that hold the truth: {_rate(sum(inside), len(inside))}")
     if alarms:
-        wrong = sum(row["verdict"] != "adequate" for row in alarms)
-        high = float(beta.ppf(0.95, wrong + 1, len(alarms) - wrong)) if wrong < len(alarms) else 1.0
         lines.append(
-            f"false alarms without an effect: {wrong} of {len(alarms)} (below {high:.1%} with 95 % confidence)"
+            f"false alarms without an effect: {_rate(sum(row['verdict'] != 'adequate' for row in alarms), len(alarms))}"
         )
     return "\n".join(lines)
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+SUPPLY_SEEN = 0.05  # [V] what a recorded bus voltage is good for
+
 Draw = Callable[[np.random.Generator], dict[str, float]]
 
 
@@ -144,6 +146,29 @@ def draw_bench(hidden: Any, name: str, seed: int) -> tuple[Any, Any]:
     rng = np.random.default_rng([seed, 1, *name.encode()])
     motions, bench = hidden.drawn_motions(rng), hidden.drawn_bench(rng)
     return motions, bench._replace(position=0.0) if name == "position_friction" else bench
+
+
+def visibility(hidden: Any, flaws: Any, n: int, seed: int, motions: Any, bench: Any) -> float:
+    """What a flaw makes of the record over what chance makes of it, in the channel that shows it best."""
+    same = {name: getattr(flaws, name) for name in ("k1", "k2", "k3", "k4", "k5", "k6", "phi")}
+    flawed, sound, again = (
+        hidden.cycles(f, n, s, motions, bench)
+        for f, s in ((flaws, seed), (hidden.Flaws(**same), seed), (hidden.Flaws(**same), seed + 500_000))
+    )
+    smooth = np.ones(50) / 50.0
+
+    def differ(a: list[Any], b: list[Any], channel: Callable[[Any], np.ndarray]) -> float:
+        pairs = zip(a, b, strict=True)
+        return float(np.mean([np.mean(np.convolve(channel(x) - channel(y), smooth, "valid") ** 2) for x, y in pairs]))
+
+    channels: list[tuple[Callable[[Any], np.ndarray], float]] = [
+        (lambda c: c["theta_u"], 0.0),
+        (lambda c: c["theta_m"], 0.0),
+        (lambda c: np.max(np.abs([c["i_a"], c["i_b"], c["i_c"]]), axis=0), 0.0),
+        *((lambda c, name=name: np.abs(c[name]), 0.0) for name in ("i_a", "i_b", "i_c")),
+        (lambda c: c["u_dc"], SUPPLY_SEEN),
+    ]
+    return float(np.sqrt(max(differ(flawed, sound, x) / (differ(again, sound, x) + floor**2) for x, floor in channels)))
 
 
 def outcome(name: str, findings: dict[str, Any]) -> str:

@@ -11,7 +11,7 @@ tracking   θ_u - θ_cmd                                                        
 gap        θ_m/GR - θ_u less its mean                                             gear: backlash, compliance
 sum        i_a + i_b + i_c, which is zero in the motor                            current sensors
 phase      currents by phase and electrical angle, plain and by sign of current   asymmetry, commutation, inverter
-supply     u_dc                                                                   supply
+supply     u_dc less its mean                                                     supply
 =========  =====================================================================  ============================
 
 They are computed alike from measured and from simulated cycles; constants in them are nominal, so they are zero for
@@ -45,7 +45,7 @@ GROUPS = {
     "gap": (5e-3, 3.0e-7, "rad"),
     "sum": (25e-3, 3.0e-4, "A"),
     "phase": (0.0, 2.0e-3, "A"),
-    "supply": (50e-3, 0.05, "V"),
+    "supply": (10e-3, 0.02, "V"),
 }
 
 _trap = vectorize(nopython=True)(lambda x: trap(x))
@@ -169,7 +169,8 @@ def features(plant: Actuator, signals: Signals) -> dict[str, Array]:
         "sum": local_mean(signals.i.sum(axis=1), m["sum"]),
     }
     if signals.u_dc is not None:
-        found["supply"] = local_mean(signals.u_dc, m["supply"])
+        u_dc = local_mean(signals.u_dc, m["supply"])
+        found["supply"] = u_dc - u_dc.mean(axis=-1, keepdims=True)
     settled = {name: x[:, skip // m[name] :] for name, x in found.items()}
     return {**settled, "phase": table.reshape(len(table), -1)}
 
