@@ -71,7 +71,8 @@ def log_likelihood(residuals: Sequence[Array], scale: float) -> list[Array]:
     out = []
     for block in residuals:
         u = np.minimum(np.abs(block) / scale, WILD)
-        out.append(-np.where(u < HUBER, 0.5 * u * u, HUBER * (u - 0.5 * HUBER)).sum(axis=0))
+        v = np.minimum(u, HUBER)
+        out.append(-(v * (u - 0.5 * v)).sum(axis=0))  # u²/2, from HUBER on along the tangent
     return out
 
 

@@ -125,10 +125,21 @@ def is_flexible(numbers: Model) -> bool:
     return bool(numbers.z[row("gear_compliance.compliance")] > 0.0)
 
 
-def load_after(numbers: Model, t: Array, theta: Array, h_max: float) -> tuple[float, float]:
-    """Position and speed of the load behind a gear after a recorded motion `theta` of the motor that began at rest."""
-    theta_l, w_l = kernel.load_after(numbers.z, t, theta, h_max)
-    return theta_l, w_l
+def loads_after(
+    numbers: Model, offsets: NDArray[np.int64], t: Array, theta: Array, follows: NDArray[np.bool_], h_max: float
+) -> Array:
+    """Position and speed of the load behind a gear, shape (n, 2), at the end of each recorded motion of the motor.
+
+    Parameters
+    ----------
+    offsets : array, shape (n + 1,)
+        Motion j is samples ``offsets[j]:offsets[j + 1]`` of `t` and `theta`.
+    follows : array of bool, shape (n,)
+        Whether a motion begins where the one before it ended; otherwise the load begins untwisted and at rest.
+    """
+    out = np.empty((len(follows), 2))
+    kernel.loads_after(numbers.z, offsets, t, theta, follows, h_max, out)
+    return out
 
 
 def true_state(numbers: Model, measured: Array) -> Array:

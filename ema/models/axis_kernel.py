@@ -110,10 +110,9 @@ def gear(z, inertia, h):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def load_after(z, t, theta, h_max):
-    """Position and speed of the load at the end of a motion `theta` of the motor that began untwisted at rest."""
+def load_after(z, t, theta, h_max, theta_l, w_l):
+    """Position and speed of the load, given at t[0], at the end of a recorded motion `theta` of the motor."""
     inertia = z[J] * (1.0 + z[INERTIA])
-    theta_l, w_l = theta[0], 0.0
     for k in range(t.shape[0] - 1):
         span = t[k + 1] - t[k]
         n_steps = max(1, math.ceil(span / h_max - 1e-9))
@@ -129,6 +128,18 @@ def load_after(z, t, theta, h_max):
             w_l += T * h / J_l
             theta_l += 0.5 * h * w_l
     return theta_l, w_l
+
+
+@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
+def loads_after(z, offsets, t, theta, follows, h_max, out):
+    """`load_after` for motions that lie one after the other; one that `follows` begins where the last one ended."""
+    theta_l, w_l = 0.0, 0.0
+    for j in range(offsets.shape[0] - 1):
+        a, b = offsets[j], offsets[j + 1]
+        if not follows[j]:
+            theta_l, w_l = theta[a], 0.0
+        theta_l, w_l = load_after(z, t[a:b], theta[a:b], h_max, theta_l, w_l)
+        out[j, 0], out[j, 1] = theta_l, w_l
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)

@@ -4,6 +4,7 @@
 `channels`      which channels of the record are drive, outputs, angle; what is missing is said
 `noise`         rms of each channel's noise: declared in the plant file, or estimated from the record
 `windows`       records cut into parts that are simulated on their own, with their start states
+`pack`          windows of one record in contiguous arrays
 `whitening`     free-run residuals → independent standard normal numbers, by the noise's own dynamics
 `weak_form`     torque residual along the measured motion, integrated against test functions
 `candidates`    library effects scaled to this axis, with starts

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from .plant import AxisPlant
 
 NAME = "gear_compliance"
-SHARES = (0.25, 0.5, 0.75)  # of the inertia, behind the gear
-FREQUENCIES = 30
+SHARES = (0.35, 0.65)  # of the inertia, behind the gear
+FREQUENCIES = 24
 LOWEST, HIGHEST = 3.0, 0.2  # [Hz], and per sample: of the load against a motor that is held
 DAMPING = 0.1
 

@@ -20,7 +20,8 @@ from . import candidates, describe, structure
 from .cogging import LONGEST_WINDOW, predictable
 from .naming import Numbers, numbers_of
 from .noise import ESTIMATE_UNCERTAINTY
-from .whitening import Filter, design, joined, open_loop_variance
+from .pack import Pack
+from .whitening import Filter, design, open_loop_variance
 from .windows import START_NOISE, Bench, Window, bench, speed_noise
 
 TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
@@ -56,7 +57,7 @@ class AxisPlant:
         self._bench_of = [b for b in benches for _ in b.windows]
         pairs = zip(self._bench_of, self.windows, strict=True)
         self.filters = [None if w.static else self._filter(b, w) for b, w in pairs]
-        self._packs: dict[tuple[int, ...], list[_Pack]] = {}
+        self._packs: dict[tuple[int, ...], list[Pack]] = {}
 
     # ---- the engine's view -------------------------------------------------------------------------------------
 
@@ -142,7 +143,7 @@ class AxisPlant:
             result |= pack.split(self._simulate(pack, model, zeros))
         return [result[j] for j in blocks]
 
-    def _simulate(self, pack: _Pack, model: axis.Model, zeros: Mapping[str, float]) -> Array:
+    def _simulate(self, pack: Pack, model: axis.Model, zeros: Mapping[str, float]) -> Array:
         zero = zeros.get(pack.bench.name, 0.0)
         if pack.direction is not None:
             return axis.holding(model, pack.position + zero, pack.direction, pack.t)[None, :]
@@ -185,13 +186,13 @@ class AxisPlant:
             return list(self._pool.map(f, points))
         return [f(point) for point in points]
 
-    def _pack(self, blocks: tuple[int, ...]) -> list[_Pack]:
+    def _pack(self, blocks: tuple[int, ...]) -> list[Pack]:
         if blocks not in self._packs:
             by_bench: dict[str, list[int]] = {}
             for j in blocks:
                 by_bench.setdefault(self.windows[j].group, []).append(j)
             self._packs[blocks] = [
-                _Pack(
+                Pack(
                     self._bench_of[indices[0]],
                     indices,
                     [self.windows[j] for j in indices],
@@ -201,11 +202,11 @@ class AxisPlant:
             ]
         return self._packs[blocks]
 
-    def _step(self, pack: _Pack) -> float:
+    def _step(self, pack: Pack) -> float:
         period = pack.windows[0].period
         return max(period / 10.0, min(period, H_MAX))
 
-    def _starts(self, pack: _Pack, model: axis.Model, step: float) -> Array:
+    def _starts(self, pack: Pack, model: axis.Model, step: float) -> Array:
         """True start states: the smoothed measurement, undone for what the model's sensors do; the twist of a gear."""
         z = model.z
         starts = np.zeros((len(pack.windows), 4))
@@ -217,8 +218,8 @@ class AxisPlant:
             starts[place, 1] = w.speed[0] if late_w == 0.0 else np.interp(w.t[0] + late_w, w.t, w.speed)
         starts[:, :2] = axis.true_state(model, starts[:, :2])
         if axis.is_flexible(model):
-            load = np.array([axis.load_after(model, *w.before, step) for w in pack.windows])
-            starts[:, 2:] = np.array([(w.position[0], w.speed[0]) for w in pack.windows]) - load
+            motor = np.array([(w.position[0], w.speed[0]) for w in pack.windows])
+            starts[:, 2:] = motor - axis.loads_after(model, *pack.history, step)
         return starts
 
     def _filter(self, b: Bench, w: Window) -> Filter:
@@ -309,29 +310,6 @@ class AxisPlant:
 
 
 _KERNEL_ROW = {"theta_m": 0, "q": 0, "w_m": 1, "v": 1, "i_q": 2, "u_q": 3}
-
-
-class _Pack:
-    """Windows of one record, one after the other in contiguous arrays."""
-
-    def __init__(self, bench: Bench, indices: list[int], windows: list[Window], filters: list[Filter]):
-        self.bench, self.indices, self.windows = bench, indices, windows
-        self.offsets = np.concatenate(([0], np.cumsum([w.n for w in windows]))).astype(np.int64)
-        self.t = np.concatenate([w.t for w in windows])
-        self.drive = np.concatenate([w.drive for w in windows])
-        self.position = np.concatenate([w.position for w in windows])
-        self.outputs = np.concatenate([w.outputs for w in windows], axis=1)
-        self.dT = np.array([w.dT for w in windows])
-        ways = [np.unique(np.sign(w.speed)) for w in windows]
-        self.slide = np.array([way[0] if len(way) == 1 else 0.0 for way in ways])
-        directions = [w.direction for w in windows if w.direction is not None]
-        self.direction = np.concatenate(directions) if directions else None
-        self.filter = joined(filters) if filters else None
-
-    def split(self, rows: Array) -> dict[int, Array]:
-        """Columns of `rows` by block."""
-        edges = self.offsets.tolist()
-        return {j: rows[:, a:b] for j, a, b in zip(self.indices, edges[:-1], edges[1:], strict=True)}
 
 
 def _shifted(key: str, have: int) -> str:

@@ -33,7 +33,8 @@ class Window:
     """Consecutive samples of one cycle, in arrays of shape (n_times,).
 
     `outputs` has one row per output channel of its record. `position`, `speed` are smooth; `static` windows hold
-    samples at rest with the `direction` of approach. `before` is time and position as recorded, up to the first sample.
+    samples at rest with the `direction` of approach. `before` is time and position as recorded, from the last gap
+    (whose number is `chain`) up to the first sample.
     """
 
     group: str
@@ -48,6 +49,7 @@ class Window:
     direction: Array | None = None
     stretch: int = 0
     before: tuple[Array, Array] = (np.empty(0), np.empty(0))
+    chain: int = 0
 
     @property
     def n(self) -> int:
@@ -142,8 +144,13 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
                 label = f"{group}, {cycle}, {t[rows][0]:.4g} s"
                 stretch = first + int((t[rows][0] - t[0]) / max(STRETCH, length))
                 columns = (t[rows], cycle[who.drive][rows], outputs, smooth[rows], speed[rows])
-                known = slice(max(gap for gap in (0, *gaps) if gap <= part[0]), int(part[0]) + 1)
-                out.append(Window(group, label, *columns, dT, stretch=stretch, before=(t[known], raw[known])))
+                gap = max(gap for gap in (0, *gaps.tolist()) if gap <= part[0])
+                before = (t[gap : part[0] + 1], raw[gap : part[0] + 1])
+                out.append(
+                    Window(
+                        group, label, *columns, dT, stretch=stretch, before=before, chain=cycle.number * 1_000_000 + gap
+                    )
+                )
     return out
 
 
