@@ -17,6 +17,7 @@ import hidden_actuator as hidden
 import numpy as np
 import platformdirs
 from ema_offline_builder import build
+from ema_offline_builder.config import Builder
 
 from ema import bundle
 from ema.core import resources
@@ -34,8 +35,10 @@ LEVELS = (0.5, 0.9, 0.95)
 N, N_HF, N_INDEPENDENT = 100, 20, 40
 
 
-def quick_bundle() -> bundle.Bundle:
+def quick_bundle(**changes: Any) -> bundle.Bundle:
+    """Of the quick configuration with other values of some of its keys."""
     builder, plant = build.read(resources.config("builder-quick.yaml"))
+    builder = Builder.model_validate(builder.model_dump(mode="json") | changes)
     name = f"bench-{bundle.VERSION}-{equations_digest()}-{digest(builder)[:12]}-{digest(plant)[:12]}"
     path = Path(platformdirs.user_cache_dir("ema")) / name
     if not path.exists():
