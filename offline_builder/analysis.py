@@ -101,10 +101,11 @@ def analyse(
 
     levels["linear"] = noise.model_error(linear, sets, S)
     tuning = tuned(plant, i0)
+    simplified = lf1.anchored(plant, tuning, i0)
 
     def lf1_at_points(x: np.ndarray) -> np.ndarray:
         parts = np.split(x[:, :N_FAULTS], range(READ, len(x), READ))
-        return np.vstack([lf1.simulate(plant, part, tuning)[:, points] for part in parts])
+        return np.vstack([simplified(part)[:, points] for part in parts])
 
     library = lf2.at(points)
     slope = np.vstack([np.zeros((N_FAULTS, len(points))), N.T])  # LF2 and LF1 know faults, but nothing beside them

@@ -37,6 +37,8 @@ def _checked(one: NuisanceParameter, plant: Actuator) -> dict[str, object]:
     if effect not in known or "ema" not in known[effect].plants:
         names = ", ".join(e for e, found in known.items() if "ema" in found.plants)
         raise ConfigError(f"{where}: no effect '{effect}'; known: {names}")
+    if known[effect].is_table:
+        raise ConfigError(f"{where}: is one value of a table, and cannot be estimated alone")
     parameters = {p.name: p for p in known[effect].parameters}
     if name not in parameters:
         raise ConfigError(f"{where}: the effect has no parameter '{name}'; it has: {', '.join(parameters)}")

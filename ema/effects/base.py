@@ -8,6 +8,7 @@ Each law belongs to a *hook*, the place in the models' equations where it enters
 hook                  arguments before the parameters                            combined by             neutral
 ====================  =========================================================  ======================  ========
 shaft_torque          θ_m [rad], ω_m [rad/s], θ_u [rad], i_q [A]                 sum, opposes motion     0 N m
+tabulated_torque      the same (see below)                                       sum, opposes motion     0 N m
 static_friction       θ_m, ω_m, θ_u, direction (±1), τ_load [N m]                product on F_s          1
 sliding_friction      θ_m, ω_m, θ_u, direction (±1), τ_load [N m]                product on F_d          1
 user_torque           θ_u [rad]                                                  sum, opposes the user   0 N m
@@ -17,7 +18,8 @@ inductance_factor     i_j [A]                                                   
 angle_error           θ_m [rad]                                                  sum, on the resolver    0 rad
 ====================  =========================================================  ======================  ========
 
-ΔT is the winding temperature less 20 °C. An effect without laws is *structural*: the model itself reads its
+ΔT is the winding temperature less 20 °C. A tabulated torque is a shaft torque that costs so much (a fifth of a step)
+that it is compiled in only for runs that have one. An effect without laws is *structural*: the model itself reads its
 parameters (a delay, a dead time, a second inertia).
 """
 
@@ -30,6 +32,7 @@ from types import MappingProxyType
 HOOKS = MappingProxyType(
     {
         "shaft_torque": ("sum", 4),
+        "tabulated_torque": ("sum", 4),
         "static_friction": ("product", 5),
         "sliding_friction": ("product", 5),
         "user_torque": ("sum", 1),
@@ -88,6 +91,11 @@ class Effect:
         unknown = set(self.laws) - set(HOOKS)
         if unknown:
             raise ValueError(f"effect {self.name}: unknown hooks {sorted(unknown)}; known: {sorted(HOOKS)}")
+
+    @property
+    def is_table(self) -> bool:
+        """Whether it is a tabulated function of no known cause: no single value of it means anything."""
+        return "tabulated_torque" in self.laws
 
     def neutral(self) -> dict[str, float]:
         """Values that switch the effect off."""

@@ -20,11 +20,11 @@ OPTIONS = Options(dk=0.02, n_steps=10, tolerance=0.05)  # friction makes the mod
 
 def make(bundle: Bundle) -> GaussNewton:
     """The LF1 identifier of a bundle; what is known of the model's error is taken off."""
-    plant, tuning, error = bundle.plant, lf1.Tuning(*bundle.arrays["lf1_tuning"]), bundle.known_error("lf1")
-    first = linear.make(bundle)
+    simulate = lf1.anchored(bundle.plant, lf1.Tuning(*bundle.arrays["lf1_tuning"]), bundle.i0)
+    first, error = linear.make(bundle), bundle.known_error("lf1")
 
     def model(x: np.ndarray, start: np.ndarray | None) -> np.ndarray:
-        return lf1.simulate(plant, x[:, :N_FAULTS], tuning, start)[:, bundle.schedule] + error(x)
+        return simulate(x[:, :N_FAULTS], start)[:, bundle.schedule] + error(x)
 
     nuisance = bundle.nuisance
     return GaussNewton("lf1", model, bundle.noise("lf1"), nuisance.started_by(first), OPTIONS, nuisance)

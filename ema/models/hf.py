@@ -182,6 +182,7 @@ def simulate(
     seeds = np.broadcast_to(np.asarray(seeds), (n,))
 
     z = parameters(plant, k, merged, dT)
+    extended = bool(merged) + any(registry()[name].is_table for name in merged)
     z[:N_STATE] = start.T
     lvdt_noise = np.zeros((n, n_times))
     current_noise = np.zeros((n, 3, n_times))
@@ -209,7 +210,7 @@ def simulate(
             dt,
             n_substeps,
             (0,) * n_lanes,
-            (0,) * bool(merged),
+            (0,) * extended,
             (0,) * audited,
         )
         z[:, first : first + used] = zb.reshape(N_ROWS, n_lanes)[:, :used]

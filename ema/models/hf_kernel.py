@@ -2,7 +2,8 @@
 
 All lanes do the same operations (branches are selects), so the compiler turns the inner loop into vector instructions;
 a single run is a batch of one. The number of lanes and the variants are taken from the *lengths* of tuples, which the
-compiler knows: ``lanes`` (16 or 1), ``extended`` (1: with the library of effects), ``audited`` (1: with energy sums).
+compiler knows: ``lanes`` (16 or 1), ``extended`` (1: with the library of effects, 2: and with tables of torque),
+``audited`` (1: with energy sums).
 """
 
 from __future__ import annotations
@@ -148,6 +149,8 @@ def mechanical_step(z, l, N, dt, tau_m, extended, audited):
         i_q = 0.5 * (abs(z[I_A * N + l]) + abs(z[I_B * N + l]) + abs(z[I_C * N + l]))
         tau_user = hooks.user_torque(z, l, N, theta_u)
         tau -= hooks.shaft_torque(z, l, N, theta_m, w_m, theta_u, i_q)
+        if len(extended) > 1:
+            tau -= hooks.tabulated_torque(z, l, N, theta_m, w_m, theta_u, i_q)
         # through the gear: stiff (the user's load acts at once) or as a spring with the user's own inertia behind it
         compliance = z[COMPLIANCE * N + l]
         soft = compliance > 0.0

@@ -23,22 +23,22 @@ def _bind(law: Callable[..., float], first: int, n: int) -> Any:
     f = _inline(law)
 
     @_inline
-    def one(z, l, N, *x):
-        return f(*x, z[first * N + l])
+    def bound(z, l, N, *x):
+        return f(*x)
+
+    for place in reversed(range(first, first + n)):
+        bound = _given(bound, place)
+    return bound
+
+
+def _given(law: Any, place: int) -> Any:
+    """A law that finds its next parameter in this row."""
 
     @_inline
-    def two(z, l, N, *x):
-        return f(*x, z[first * N + l], z[(first + 1) * N + l])
+    def bound(z, l, N, *x):
+        return law(z, l, N, *x, z[place * N + l])
 
-    @_inline
-    def three(z, l, N, *x):
-        return f(*x, z[first * N + l], z[(first + 1) * N + l], z[(first + 2) * N + l])
-
-    @_inline
-    def four(z, l, N, *x):
-        return f(*x, z[first * N + l], z[(first + 1) * N + l], z[(first + 2) * N + l], z[(first + 3) * N + l])
-
-    return {1: one, 2: two, 3: three, 4: four}[n]
+    return bound
 
 
 def _combine(how: str, head: Any, tail: Any) -> Any:
@@ -70,6 +70,7 @@ def combined(hook: str, plant: str = "ema", row: Callable[[str], int] = row) -> 
 
 
 shaft_torque = combined("shaft_torque")
+tabulated_torque = combined("tabulated_torque")
 static_friction = combined("static_friction")
 sliding_friction = combined("sliding_friction")
 user_torque = combined("user_torque")

@@ -10,6 +10,7 @@ own functions.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,6 +76,20 @@ def simulate(plant: Actuator, k: np.ndarray, tuning: Tuning = Tuning(), start: n
         integrate(zb, command, out, DT, round(1.0 / (plant.control.rate * DT)), (0,) * N_LANES)
         i[first : first + N_LANES] = out.T[: n - first]
     return smoothed(np.abs(i), plant.control.rate)
+
+
+def anchored(plant: Actuator, tuning: Tuning, i0: np.ndarray) -> Callable[..., np.ndarray]:
+    """LF1 that tells deviations from HF's nominal envelope:   i(k, start) = i₀ + i_LF1(k, start) - i_LF1(0)
+
+    What LF1 gets wrong without faults is known, whatever else it gets wrong.
+
+    Parameters
+    ----------
+    i0 : array, shape (n_times,)
+        Mean envelope of HF without faults. [A]
+    """
+    offset = i0 - simulate(plant, np.zeros((1, faults.N_FAULTS)), tuning)[0]
+    return lambda k, start=None: simulate(plant, k, tuning, start) + offset
 
 
 @m._jit

@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from made_up import NOISE, A, N
 
 from ema.core.status import Reason, Status
 from ema.identification import Measurement
 from ema.identification.fit import unseparable
 from ema.identification.gauss_newton import GaussNewton, Options
 from ema.identification.linear import Linear
-from ema.identification.noise import N_START, NoiseModel
 
-N = 30
-RNG = np.random.default_rng(5)
-A = RNG.standard_normal((N, 6))
-S = 1e-4 * np.eye(N)
-LEVELS = np.array([0.1, 1.0]), np.array([0.3, 0.7]), np.zeros((2, 2, N, N))
-NOISE = NoiseModel(S, *LEVELS, *np.zeros((2, N, N)), np.zeros((N, N_START)), np.ones(2))
 START = np.zeros(2)
 
 
@@ -57,7 +51,7 @@ def test_bounds_are_kept_and_said():
 
 
 def test_a_foreign_signal_puts_the_model_in_doubt():
-    e = iterative().estimate(Measurement.complete(RNG.standard_normal(N), START))
+    e = iterative().estimate(Measurement.complete(np.random.default_rng(5).standard_normal(N), START))
     assert e.reasons & Reason.MODEL_IN_DOUBT
     assert e.status == Status.DEGRADED
 

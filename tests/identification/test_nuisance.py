@@ -6,22 +6,16 @@ import numpy as np
 import pytest
 from ema_offline_builder.config import Builder
 from ema_offline_builder.nuisance import resolve
+from made_up import NOISE, A, N, S
 
 from ema.core.errors import ConfigError
 from ema.core.status import Reason, Status
 from ema.identification import METHODS, Measurement, identifier
 from ema.identification.gauss_newton import GaussNewton
 from ema.identification.linear import Linear
-from ema.identification.noise import N_START, NoiseModel
 from ema.identification.nuisance import NONE, Nuisance
 from ema.models.envelope import envelope
 
-N = 30
-RNG = np.random.default_rng(5)
-A = RNG.standard_normal((N, 6))
-S = 1e-4 * np.eye(N)
-LEVELS = np.array([0.1, 1.0]), np.array([0.3, 0.7]), np.zeros((2, 2, N, N))
-NOISE = NoiseModel(S, *LEVELS, *np.zeros((2, N, N)), np.zeros((N, N_START)), np.ones(2))
 DRAG = Nuisance(("viscous_drag.coefficient",), ("N m s/rad",), *(np.array([v]) for v in (2e-5, 1e-4, 0.0, 1e-4, 3e-5)))
 
 
@@ -152,6 +146,7 @@ def test_three_real_shorts_are_not_explained_away_in_silence(hidden, coarse_bund
     ("nuisance", "says"),
     [
         (["magnet.change"], "no effect 'magnet'; known: .*magnet_flux"),
+        (["position_torque.torque_3"], "one value of a table"),
         (["magnet_flux.size"], "no parameter 'size'; it has: change, per_kelvin"),
         (
             [{"parameter": "magnet_flux.change", "low": 0.05}],
