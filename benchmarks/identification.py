@@ -24,6 +24,7 @@ from ema.core import resources
 from ema.core.config import digest
 from ema.identification import Measurement, identifier
 from ema.models import hf
+from ema.models.actuator import Actuator
 from ema.models.envelope import envelope
 from ema.models.jit import equations_digest
 
@@ -35,9 +36,10 @@ LEVELS = (0.5, 0.9, 0.95)
 N, N_HF, N_INDEPENDENT = 100, 20, 40
 
 
-def quick_bundle(**changes: Any) -> bundle.Bundle:
-    """Of the quick configuration with other values of some of its keys."""
-    builder, plant = build.read(resources.config("builder-quick.yaml"))
+def quick_bundle(plant: Actuator | None = None, **changes: Any) -> bundle.Bundle:
+    """Of the quick configuration with other values of some of its keys; of another plant than the shipped one."""
+    builder, shipped = build.read(resources.config("builder-quick.yaml"))
+    plant = plant or shipped
     builder = Builder.model_validate(builder.model_dump(mode="json") | changes)
     name = f"bench-{bundle.VERSION}-{equations_digest()}-{digest(builder)[:12]}-{digest(plant)[:12]}"
     path = Path(platformdirs.user_cache_dir("ema")) / name

@@ -14,7 +14,9 @@ import sys
 import numpy as np
 import pytest
 import yaml
+from hidden_traffic import watched
 
+from ema import bundle as bundles
 from ema.core import resources
 from ema.core.csv_records import write_csv
 from ema.core.records import Cycle, Record
@@ -81,6 +83,15 @@ def test_estimates_become_better(folder, coarse_bundle, method):
     before, after = err_k(ema(*words, coarse_bundle.path)), err_k(ema(*words, folder / "bundle"))
     print(f"{method}: err_k {before:.4f} -> {after:.4f}")
     assert after < 0.25 * before
+
+
+def test_false_alarms_end(folder, coarse_bundle, hidden):
+    """The monitor on the bundle of the plain plant and on that of the extended one, the same flight."""
+    cycles = hidden.cycles(hidden.Flaws(flux=FLUX, k1=K[0]), 6, 17, motions=(hidden.chirp(),))
+    before, after = (watched(b, cycles).alarms(K) for b in (coarse_bundle, bundles.load(folder / "bundle")))
+    print(f"false alarms: {', '.join(before)} -> {', '.join(after) or 'none'}")
+    assert before == ["k3", "k4", "k5"]
+    assert after == []
 
 
 def test_nothing_more_is_found_on_the_extended_plant(folder):

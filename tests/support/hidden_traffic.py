@@ -1,20 +1,32 @@
-"""Cycles of the independent actuator as the frames that a real one would send."""
+"""Cycles of the independent actuator as the frames that a real one would send, and what a monitor says of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
+from ema_postflight.report_settings import ReportSettings, Severity
+from ema_postflight.series import SeverityTrack
 from ema_simulator.fleet import CycleData
 from ema_simulator.traffic import Traffic
+
+from ema.bundle import Bundle
+from ema.bus import codec as codecs
+from ema.bus.codec import Codec
+from ema.core import config, resources
+from ema.core.names import FAULTS
+from ema.core.status import Reason
+from ema.identification import Estimate
+from ema.monitor import Event, Identified, Monitor, MonitorSettings, Runner, answers
 
 PERIOD = 1.0  # [s] from one test cycle to the next
 EPOCH_NS = 1_700_000_000_000_000_000
 ROOM = 20.0  # °C
 
 
-def frames(cycles: Iterable[dict[str, np.ndarray]], codec: object) -> np.ndarray:
+def frames(cycles: Iterable[dict[str, np.ndarray]], codec: Codec) -> np.ndarray:
     """Frames of actuator 0 in the order and with the times of their reception; `cycles` by `hidden_actuator.cycles`."""
     traffic, parts = Traffic(codec, [0]), []
     for number, c in enumerate(cycles):
@@ -26,3 +38,38 @@ def frames(cycles: Iterable[dict[str, np.ndarray]], codec: object) -> np.ndarray
         sent["t_ns"] = EPOCH_NS + np.round(1e9 * (t_start + due)).astype(np.int64)
         parts.append(sent)
     return np.concatenate(parts)
+
+
+class Watched(NamedTuple):
+    """What a monitor said of a flight of actuator 0."""
+
+    estimates: list[Estimate]  # by the method asked for, with the monitor's reasons
+    events: list[Event]
+
+    @property
+    def doubted(self) -> np.ndarray:
+        """Whether each estimate is marked ``model in doubt``, shape (n,)."""
+        return np.array([bool(e.reasons & Reason.MODEL_IN_DOUBT) for e in self.estimates])
+
+    def alarms(self, k: Sequence[float]) -> list[str]:
+        """Faults that are worth watching at the end of the flight by the report's thresholds, and are not there."""
+        settings = config.load(resources.config("report.yaml"), ReportSettings)
+        found = []
+        for j, fault in enumerate(FAULTS):
+            levels = settings.severity[fault].levels
+            track = SeverityTrack(levels, settings.persistence)
+            for e in self.estimates:
+                track.add(float(e.k[j]))
+            if track.severity > Severity.OK and k[j] < levels[0]:
+                found.append(fault)
+        return found
+
+
+def watched(bundle: Bundle, cycles: Iterable[dict[str, np.ndarray]], method: str = "lf2") -> Watched:
+    """A flight as the daemon's monitor sees it, with `method` asked in every cycle."""
+    shared = codecs.default()
+    settings = MonitorSettings.model_validate({"slower": {method: {"every": PERIOD / 2}}})
+    monitor, runner = Monitor({0: bundle}, shared, settings), Runner({0: bundle})
+    said = list(answers([frames(cycles, shared)], monitor, runner))
+    estimates = [o.estimate for o in said if isinstance(o, Identified) and o.estimate.method == method]
+    return Watched(estimates, [o for o in said if isinstance(o, Event)])

@@ -1,0 +1,41 @@
+"""An actuator that does what its bundle's plant does not: estimates are marked, and an event names the cycles."""
+
+from __future__ import annotations
+
+import pytest
+from hidden_traffic import watched
+
+from ema.monitor import Level
+
+N = 6  # cycles
+
+
+def flown(hidden, bundle, **flaws):
+    return watched(bundle, hidden.cycles(hidden.Flaws(**flaws), N, 17, motions=(hidden.chirp(),)))
+
+
+@pytest.mark.parametrize("flaws", [{"cogging": 0.01}, {"viscous": 6e-5}], ids=["cogging", "viscous drag"])
+def test_an_unmodelled_effect_puts_the_model_in_doubt(hidden, coarse_bundle, flaws):
+    """From the third cycle that speaks against it; the event says which cycles, and what to do with them."""
+    seen = flown(hidden, coarse_bundle, **flaws)
+    assert len(seen.estimates) == N
+    assert seen.doubted.all()
+    (event,) = [e for e in seen.events if e.code == "model_in_doubt"]
+    assert event.level is Level.WARNING
+    assert "cycles 0, 1, 2" in event.text
+    assert "ema discrepancy LOG --plant FILE --cycles 0,1,2" in event.text
+
+
+@pytest.mark.parametrize("faults", [{}, {"k1": 0.05, "k4": 0.04}, {"k1": 0.3}, {"k2": 0.1}], ids=str)
+def test_neither_a_sound_actuator_nor_a_faulty_one_is_doubted(hidden, coarse_bundle, faults):
+    seen = flown(hidden, coarse_bundle, **faults)
+    assert seen.doubted.sum() <= 1
+    assert not any(e.code == "model_in_doubt" for e in seen.events)
+    assert not seen.alarms([faults.get(f"k{j}", 0.0) for j in range(1, 7)])
+
+
+def test_a_weaker_magnet_is_three_false_alarms_that_no_residual_tells(hidden, coarse_bundle):
+    """Its response and that of three equal shorts differ by less than a model is trusted (docs/nuisance.md)."""
+    seen = flown(hidden, coarse_bundle, flux=-0.066)
+    assert seen.alarms([0.0] * 6) == ["k3", "k4", "k5"]
+    assert seen.doubted.sum() <= 1
