@@ -25,7 +25,18 @@ def _registry() -> Any:
     import pint
 
     registry: Any = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+    registry.define("@alias turn = rev")
     return registry
+
+
+def _check_angle(name: str, unit: str) -> None:
+    """ValueError for counts, Hz or 1/min where an angle or angular speed is meant: pint takes each for a radian."""
+    if unit not in ("rad", "rad/s"):
+        return
+    root = _registry().Quantity(1.0, name).to_root_units()
+    if dict(root.unit_items()).get("radian") != 1:
+        right = "rad, deg or turn" if unit == "rad" else "rad/s, deg/s or rpm"
+        raise ValueError(f"[{name}] does not say of which angle; write {right}")
 
 
 def to_unit(value: str, unit: str) -> float:
@@ -37,11 +48,15 @@ def to_unit(value: str, unit: str) -> float:
     try:
         number, name = _parted(value)
         quantity = _registry().Quantity(float(number), name)
-        return float(f"{quantity.to(unit or 'dimensionless').magnitude:.15g}")  # 0.36 mH is 0.00036 H, not a bit less
+        converted = float(
+            f"{quantity.to(unit or 'dimensionless').magnitude:.15g}"
+        )  # 0.36 mH: 0.00036 H, not a bit less
     except pint.DimensionalityError as error:
         raise ValueError(f"{value!r} has the wrong unit, expected [{unit or '1'}]") from error
     except (pint.PintError, *_PARSER) as error:
         raise ValueError(f"{value[:80]!r} is not a number with a unit of [{unit or '1'}]") from error
+    _check_angle(name, unit)
+    return converted
 
 
 def _parted(text: str) -> tuple[str, str]:
@@ -78,6 +93,7 @@ def convert(from_unit: str, unit: str) -> tuple[float, float]:
         raise ValueError(f"[{from_unit}] cannot be converted to [{unit}]") from error
     except (pint.PintError, *_PARSER) as error:
         raise ValueError(f"[{from_unit[:80]}] is not a known unit, expected one of [{unit}]") from error
+    _check_angle(from_unit, unit)
     return one - zero, zero
 
 

@@ -73,9 +73,10 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
     if outcome == "adequate" and not verdict.is_noise:
         notes.append(
             f"what is left is {verdict.rms:.3g} times the noise and not white ({verdict.because}, "
-            f"p = {verdict.p_value:.1g}), but no effect and no term foretells held-out parts better: filtered, "
-            "quantised or held channels look like this"
+            f"p = {verdict.p_value:.1g}), and no effect and no term foretells held-out parts better: filtered, "
+            "quantised or held channels can look like this, and so can something small that is missing"
         )
+    last = _judged(plant, state.model)
     names = [f.name for f in plant.base]
     return Outcome(
         verdict=outcome,
@@ -94,6 +95,7 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
         k_error=tuple(np.sqrt(np.diag(final.covariance))[: len(names)].tolist()),
         point=final.point,
         notes=notes,
+        rest=0.0 if last.is_noise else state.model.rms,
     )
 
 

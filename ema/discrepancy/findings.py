@@ -63,6 +63,8 @@ class Findings:
         Values that replace those of the plant file beside the effects.
     unnamed : list of FoundEffect
         Structure that is written into the extended plant without being a cause.
+    rest : float
+        What is left over noise, where that is told and it is more than noise; else 0.
     """
 
     verdict: Literal["adequate", "explained", "unexplained"]
@@ -74,6 +76,7 @@ class Findings:
     records: list[dict[str, Any]] = field(default_factory=list)
     fitted: dict[str, Any] = field(default_factory=dict)
     unnamed: list[FoundEffect] = field(default_factory=list)
+    rest: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """The content of findings.json."""
@@ -97,6 +100,7 @@ class Findings:
             },
             "tried": self.tried,
             "notes": self.notes,
+            **({"rest": self.rest} if self.rest else {}),
             **({"records": self.records} if self.records else {}),
         }
 
@@ -107,8 +111,18 @@ class Findings:
     def sentences(self) -> list[str]:
         """What an engineer would say."""
         if self.verdict == "adequate":
-            return ["The simulation agrees with the measurement: what is left is noise."]
+            if not self.rest:
+                return ["The simulation agrees with the measurement: what is left is noise."]
+            return [
+                f"What is left is small, {self.rest:.3g} times the noise, but it is not noise; nothing that was tried "
+                "foretells it."
+            ]
         said = [_said(effect) for effect in self.effects]
+        if self.verdict == "explained" and self.rest:
+            said.append(
+                f"What is left is {self.rest:.3g} times the noise, not noise: a law has not quite the right form, or "
+                "something smaller is missing."
+            )
         if self.verdict == "unexplained":
             said.append("No effect of the library explains the rest; its structure: " + describe(self.structure) + ".")
         return said

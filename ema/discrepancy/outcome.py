@@ -36,7 +36,8 @@ class Outcome:
     Attributes
     ----------
     verdict : str
-        ``adequate``: the residual is noise. ``explained``: with the effects it is noise, or within a fifth of it.
+        ``adequate``: the residual is noise, or (`rest`) within a fifth of it and nothing foretells it better.
+        ``explained``: with the effects it is noise, or (`rest`) little of it is left.
         ``unexplained``: something is left; `structure` says what it looks like.
     because : str
         What the verdict on the plain model rests on.
@@ -48,6 +49,8 @@ class Outcome:
         Effects that, if they were there, would be taken for a change of the base parameters on these records.
     k_error : tuple of float
         Standard deviations of `k_after`.
+    rest : float
+        Residual over noise where the final model leaves more than noise, 0 where it does not.
     point : Point
         All fitted values of the final model.
     """
@@ -68,3 +71,4 @@ class Outcome:
     k_error: tuple[float, ...] = ()
     point: Point = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    rest: float = 0.0

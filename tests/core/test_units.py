@@ -24,6 +24,21 @@ def test_a_number_with_its_unit(text, unit, value):
 
 
 @pytest.mark.parametrize(
+    ("unit", "scale"), [("rpm", 0.10471975511965977), ("rev/min", 0.10471975511965977), ("deg/s", 0.017453292519943295)]
+)
+def test_angular_speeds(unit, scale):
+    assert convert(unit, "rad/s") == pytest.approx((scale, 0.0))
+
+
+@pytest.mark.parametrize(("name", "unit"), [("1/min", "rad/s"), ("Hz", "rad/s"), ("1/s", "rad/s"), ("counts", "rad")])
+def test_what_does_not_say_of_which_angle_is_not_taken_for_radians(name, unit):
+    with pytest.raises(ValueError, match="does not say of which angle; write rad"):
+        convert(name, unit)
+    with pytest.raises(ValueError, match="does not say of which angle; write rad"):
+        to_unit(f"3 {name}", unit)
+
+
+@pytest.mark.parametrize(
     "text", ["9**9**9**9 s", "3 s**9**9", "3 s^99", "0.3 s\n{", "3 s (", "3 __import__", "[]", "s" * 500]
 )
 def test_what_is_no_quantity_is_refused_and_not_calculated(text):

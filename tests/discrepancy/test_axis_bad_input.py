@@ -32,6 +32,10 @@ def record(**channels):
         (record(i_q=np.clip(I, -0.8, 0.8), w_m=W), "i_q is clipped"),
         (record(i_q=np.where(T[300] == T, np.nan, I), w_m=W), "i_q is not a number at t = 0.3 s (1 samples)"),
         (record(i_q=np.roll(SHAKEN, 150), w_m=FOLLOWS), "w_m runs 0.15 s ahead of i_q: the channels are out of step"),
+        (
+            record(i_q=I, w_m=W, theta_m=np.cumsum(W) * 1e-3 / 9.55),
+            "theta_m changes 0.105 times as fast as w_m [rad/s]",
+        ),
         (Record((Cycle(0, {"t": T[:20], "i_q": I[:20], "w_m": W[:20]}),)), "too short"),
     ],
 )

@@ -14,6 +14,7 @@ from ema.models.axis_config import Axis, LinearAxis
 
 MIN_SAMPLES = 40
 MAX_LAG = 30  # samples; less is a delay that can be examined
+ONE_SCALE = 1.25  # ratio of the recorded speed to that of the position
 IN_STEP = 0.8  # correlation of the torque that the motion needs with the recorded one
 DRIVE_CHANNEL = {"current": "i_q", "voltage": "u_q", "force": "force", "speed-loop": "w_ref"}
 
@@ -54,6 +55,8 @@ def roles(plant: Axis, record: Record) -> Roles:
         )
     _finite(record, (drive, *outputs))
     _not_clipped(record, (drive, *moving))
+    if speed in have and position in have:
+        _one_scale(record, position, speed)
     if speed in have and kind in ("current", "force"):
         _in_step(plant, record, drive, speed)
     return Roles(kind, drive, position if position in have else None, speed if speed in have else None, tuple(outputs))
@@ -77,6 +80,25 @@ def _finite(record: Record, names: tuple[str, ...]) -> None:
                     f"{record.name}: {cycle}: {name} is not a number at t = {cycle['t'][bad[0]]:g} s "
                     f"({bad.size} samples): cut these out or split the cycle there"
                 )
+
+
+def _one_scale(record: Record, position: str, speed: str) -> None:
+    """Where it moves, the position must change as fast as the speed says: other units and signs are no effect."""
+    ratios = []
+    for cycle in record:
+        width = min(11, cycle.n_samples // 2 * 2 - 1)
+        if width < 3:
+            continue
+        x, w = (savgol_filter(cycle[name], width, 1) for name in (position, speed))
+        moves = np.gradient(x, cycle["t"])
+        fast = np.abs(w) > max(0.5 * float(np.sqrt(np.mean(w**2))), 1e-300)
+        ratios.append(moves[fast] / w[fast])
+    ratio = float(np.median(np.concatenate(ratios))) if ratios and any(r.size for r in ratios) else 1.0
+    if not 1.0 / ONE_SCALE < ratio < ONE_SCALE:
+        raise RecordError(
+            f"{record.name}: {position} changes {ratio:.3g} times as fast as {speed} [{CHANNELS[speed].unit}] says: "
+            "one of them has another unit or sign than its header"
+        )
 
 
 def _in_step(plant: Axis, record: Record, drive: str, speed: str) -> None:

@@ -46,6 +46,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         notes,
         [asdict(r) for r in outcome.records],
         _fitted(plant, outcome),
+        rest=outcome.rest,
     )
 
 
