@@ -118,7 +118,7 @@ class Findings:
                 "foretells it."
             ]
         said = [_said(effect) for effect in self.effects]
-        if self.verdict == "explained" and self.rest:
+        if self.verdict == "explained" and self.rest > SEEN:
             said.append(
                 f"What is left is {self.rest:.3g} times the noise, not noise: a law has not quite the right form, or "
                 "something smaller is missing."
@@ -129,6 +129,7 @@ class Findings:
 
 
 SURE = 0.9
+SEEN = 1.05  # times the noise, where a rest beside a cause is worth a word
 
 
 def _said(effect: FoundEffect) -> str:

@@ -5,8 +5,10 @@ A few seeds only; the table over many is printed by ``make bench-discrepancy``.
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.examine import examine
 from ema.models.axis_config import RotaryAxis
@@ -70,3 +72,21 @@ def test_a_line_of_no_whole_order_is_unexplained_with_its_order(axis_bench, hidd
     assert outcome.verdict == "unexplained"
     assert outcome.effects == []
     assert outcome.structure["orders"][0] == pytest.approx(truth["odd_line"]["order"], abs=0.05)
+
+
+@pytest.mark.parametrize(("away", "seen"), [(0.0, 0.0), (0.9, 0.9 - 5.0 * 2.0 * np.pi / 36.0)])
+def test_records_with_other_angle_zeros_are_laid_over_each_other(axis_bench, hidden_axis, away, seen):
+    bench, truth, rng = hidden_axis.bench_with(["cogging"], 3)
+    assert truth["cogging"]["order"] == 36.0
+    first, second = (axis_bench.record(bench, rng, motions=axis_bench.MOTIONS[k : k + 2]) for k in (0, 2))
+    cycles = [Cycle(c.number, {**c.channels, "theta_m": c["theta_m"] - away}) for c in second]
+    plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [first, Record(tuple(cycles))])
+    assert plant.zeros["record 2"].angle == pytest.approx(seen, abs=1e-3)
+    assert ("zero:record 2" in [f.name for f in plant.base]) == (away != 0.0)
+
+
+def test_records_without_a_torque_locked_to_the_angle_say_nothing_of_their_zeros(axis_bench, hidden_axis):
+    bench, _, rng = hidden_axis.bench_with([], 3)
+    records = [axis_bench.record(bench, rng, motions=axis_bench.MOTIONS[k : k + 2]) for k in (0, 2)]
+    plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), records)
+    assert plant.zeros["record 2"].angle is None

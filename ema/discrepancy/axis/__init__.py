@@ -10,6 +10,7 @@
 `candidates`    library effects scaled to this axis, with starts
 `cogging`       the order scan
 `gear`          the scan for a resonance of a gear that gives
+`zeros`         angle zeros of records given together
 `structure`     terms suggested by the torque residual when no effect explains it
 `plant`         all of it as the engine's `Plant`
 ==============  =====================================================================================

@@ -79,6 +79,10 @@ def base(plant: AxisPlant) -> tuple[Free, ...]:
         scale = value if value > 0.0 else 0.1 * s.torque / s.speed
         high = max(value, scale) * BASE_RANGE
         free.append(Free(name, unit, value / BASE_RANGE, high, value, 0.05 * scale, prior=PRIOR * scale))
+    for record, zero in plant.zeros.items():
+        if zero.angle:
+            room = np.pi / max(zero.orders)
+            free.append(Free(f"zero:{record}", "rad", zero.angle - room, zero.angle + room, zero.angle, 0.1 * room))
     return tuple(free)
 
 

@@ -23,6 +23,7 @@ from .noise import ESTIMATE_UNCERTAINTY
 from .pack import Pack
 from .whitening import Filter, design, open_loop_variance
 from .windows import START_NOISE, Bench, Window, bench, speed_noise
+from .zeros import zeros
 
 TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
 RUNAWAY = 1e6  # a window that runs away counts as no worse than this
@@ -50,6 +51,7 @@ class AxisPlant:
         if plant.window is None:
             lengths = [predictable(self, b) for b in self.benches]
             self._take([bench(plant, *parts) for parts in zip(records, names, lengths, strict=True)])
+        self.zeros = zeros(self)
 
     def _take(self, benches: Sequence[Bench]) -> None:
         self.benches = tuple(benches)
@@ -63,7 +65,7 @@ class AxisPlant:
 
     @cached_property
     def base(self) -> tuple[Free, ...]:
-        """Friction, and what the plant file says is to be fitted."""
+        """Friction, what the plant file says is to be fitted, and angle zeros that differ between records."""
         return candidates.base(self)
 
     @cached_property

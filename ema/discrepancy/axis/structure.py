@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 N_GRID = 300  # members of a family at most
 N_CENTRES = 24
 N_SUGGESTIONS = 4
+ONE_SINE = 0.5  # of the power of the speed in one line
 MIN_GAIN = 0.01  # of the weak-form residual's power
 
 
@@ -51,7 +52,7 @@ def search(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candid
     q, _ = np.linalg.qr(np.stack(columns, axis=1))
     rest = y - q @ (q.T @ y)
     best: dict[str, tuple[float, Term, Array]] = {}
-    for family, terms in _families(m, sizes(plant)).items():
+    for family, terms in _families(m, sizes(plant), _own_frequency(plant)).items():
         for gain, term, coefficients in _gains(weak, terms, q, rest):
             if gain > best.get(family, (0.0,))[0]:
                 best[family] = (gain, term, coefficients)
@@ -61,9 +62,9 @@ def search(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candid
     return [_candidate(f"term{number}", term, c, plant) for _, term, c in ranked[:N_SUGGESTIONS]]
 
 
-def _families(m: Motion, s: Sizes) -> dict[str, list[Term]]:
+def _families(m: Motion, s: Sizes, own: float) -> dict[str, list[Term]]:
     out: dict[str, list[Term]] = {}
-    for term in _dictionary(m, s):
+    for term in _dictionary(m, s, own):
         out.setdefault(term.family, []).append(term)
     return out
 
@@ -85,7 +86,7 @@ def _norms(columns: Array) -> Array:
     return np.asarray(np.linalg.norm(columns, axis=0))
 
 
-def _dictionary(m: Motion, s: Sizes) -> Iterator[Term]:
+def _dictionary(m: Motion, s: Sizes, own: float) -> Iterator[Term]:
     sign, one = np.sign(m.direction), np.ones(len(m.theta))
     span = float(np.ptp(m.theta))
     duration = float(np.ptp(m.t))
@@ -114,11 +115,28 @@ def _dictionary(m: Motion, s: Sizes) -> Iterator[Term]:
         yield from _bumps("position", m.theta, one, sign)
     if duration > 0.0:
         resolution = 1.0 / duration
-        for f in np.linspace(resolution, min(resolution * N_GRID / 2, 0.2 / s.period), N_GRID):
+        frequencies = np.linspace(resolution, min(resolution * N_GRID / 2, 0.2 / s.period), N_GRID)
+        for f in frequencies:
+            if own and abs(f - own * max(round(f / own), 1)) < resolution:
+                continue  # whatever depends on the motion swings with it
             a = 2.0 * np.pi * f * m.t
             refine = {"frequency": (max(f - resolution, 0.0), f + resolution, 0.1 * resolution)}
             yield Term("time line", (np.cos(a), np.sin(a)), {"frequency": float(f)}, refine)
         yield from _bumps("time", m.t, one, sign)
+
+
+def _own_frequency(plant: AxisPlant) -> float:
+    """Frequency of a motion that is little more than one sine, 0 of any other.   [Hz]"""
+    moving = [w for w in plant.windows if not w.static]
+    if not moving:
+        return 0.0
+    t, w = (np.concatenate([getattr(window, name) for window in moving]) for name in ("t", "speed"))
+    w = w - w.mean()
+    resolution = 0.5 / max(float(np.ptp(t)), 1e-9)
+    frequencies = resolution * np.arange(1, N_GRID + 1)
+    swing = np.array([abs(np.exp(2j * np.pi * f * t) @ w) for f in frequencies])
+    share = 2.0 * swing**2 / max(len(w) * float(w @ w), 1e-300)
+    return float(frequencies[np.argmax(share)]) if share.max() > ONE_SINE else 0.0
 
 
 def _bumps(what: str, x: Array, one: Array, sign: Array) -> Iterator[Term]:

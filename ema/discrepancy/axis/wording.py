@@ -36,7 +36,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     notes = [*outcome.notes]
     if outcome.verdict != "adequate":
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
-    notes += _moved(plant, outcome) + _kinds(plant)
+    notes += _moved(plant, outcome) + _kinds(plant) + _zeros(plant, outcome)
     return shared.Findings(
         outcome.verdict,
         [_effect(e) for e in outcome.effects],
@@ -75,7 +75,8 @@ def _kinds(plant: AxisPlant) -> list[str]:
     out = []
     for b in plant.benches:
         noise = ", ".join(
-            f"{name} {n.sigma:.2g}" + (f" and {n.jitter:.2g} s of sampling time" if n.jitter > 1e-6 else "")
+            f"{name} {n.sigma:.2g}"
+            + (f" and {n.jitter:.2g} s of sampling time" if n.jitter > 1e-6 and not b.static else "")
             for name, n in b.noise.items()
             if not n.declared
         )
@@ -85,10 +86,28 @@ def _kinds(plant: AxisPlant) -> list[str]:
     return out
 
 
+def _zeros(plant: AxisPlant, outcome: Outcome) -> list[str]:
+    """Where the angle zeros of records given together lie."""
+    out = []
+    for name, zero in plant.zeros.items():
+        if zero.angle is None:
+            out.append(
+                f"{name}: no torque locked to the angle stands out, its angle zero is taken to be that of the others"
+            )
+        elif zero.angle:
+            orders = ", ".join(f"{n:g}" for n in zero.orders)
+            other = f", or by multiples of {zero.period:.4g} rad more" if zero.period < 6.0 else ""
+            out.append(
+                f"{name}: angles are {outcome.point[f'zero:{name}']:+.4g} rad off (torque of order {orders}{other})"
+            )
+    return out
+
+
 def _fitted(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
     """Base parameters as fitted, and unnamed terms, for extended.yaml."""
     point = outcome.point
-    out: dict[str, Any] = {f.name: float(f"{point[f.name]:.6g}") for f in plant.base}
+    base = [f.name for f in plant.base if not f.name.startswith("zero:")]  # a zero is the record's, not the plant's
+    out: dict[str, Any] = {name: float(f"{point[name]:.6g}") for name in base}
     p = plant.plant
     if p.F_s is not None and p.F_d > 0.0:  # static friction keeps its ratio, as it did in the fit
         out["F_s"] = float(f"{p.F_s / p.F_d * point['F_d']:.6g}")

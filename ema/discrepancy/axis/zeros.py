@@ -1,0 +1,75 @@
+"""Angle zeros of records that are given together: an encoder may count from another angle each time it is switched on.
+
+A torque locked to the rotor, Re Σ z_n exp(i n θ), is the same in every record; seen from another zero, θ = θ_r + δ, its
+lines are z_n exp(i n δ). δ is where they lie over each other.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ema.core.records import Array
+from ema.models.axis_config import LinearAxis
+
+from .cogging import integer_orders, scan, thinned
+from .weak_form import weak_form
+
+if TYPE_CHECKING:
+    from .plant import AxisPlant
+
+SAME = 0.98  # of the best overlap: a zero that reaches it is as good, the smallest is taken
+STEPS = 64  # of δ in one period of the highest order
+
+
+@dataclass(frozen=True)
+class Zero:
+    """Angle to be added to the positions of a record, found by lines of `orders`; None where nothing tells. [rad]"""
+
+    angle: float | None
+    orders: tuple[float, ...] = ()
+
+    @property
+    def period(self) -> float:
+        """Angle by multiples of which the zero may be another. [rad]"""
+        return 2.0 * math.pi / math.gcd(*(round(n) for n in self.orders))
+
+
+def zeros(plant: AxisPlant) -> dict[str, Zero]:
+    """By record, beside the first one that shows such a torque; empty for one record or a linear axis."""
+    if len(plant.benches) < 2 or isinstance(plant.plant, LinearAxis):
+        return {}
+    lines = {b.name: _lines(plant, b.name) for b in plant.benches if b.roles.position is not None}
+    if not lines:
+        return {}
+    first = next((name for name, own in lines.items() if own), next(iter(lines)))
+    return {name: _between(lines[first], own) for name, own in lines.items() if name != first}
+
+
+def _lines(plant: AxisPlant, name: str) -> dict[float, complex]:
+    """z_n by order. [N m]"""
+    weak = thinned(weak_form(plant, {}, [j for j, w in enumerate(plant.windows) if w.group == name]))
+    orders = integer_orders(weak)
+    if len(orders) == 0 or len(weak.y) < 30:
+        return {}
+    found = scan(weak, orders)
+    return {n: complex(c, -s) for n, (c, s) in zip(found.orders, found.parts, strict=True)}
+
+
+def _between(reference: dict[float, complex], own: dict[float, complex]) -> Zero:
+    shared = tuple(sorted(reference.keys() & own.keys()))
+    if not shared:
+        return Zero(None)
+    n = np.array(shared)
+    products = np.array([reference[k].conjugate() * own[k] for k in shared])
+    delta = np.linspace(-math.pi, math.pi, 2 * round(STEPS * n.max() / 2) + 1)
+    overlap: Array = (products * np.exp(-1j * np.outer(delta, n))).real.sum(axis=1)
+    good = np.flatnonzero(overlap >= SAME * overlap.max())
+    if overlap[len(delta) // 2] >= SAME * overlap.max():
+        return Zero(0.0, shared)
+    near = good[np.argmin(np.abs(delta[good]))]
+    peak = good[np.abs(delta[good] - delta[near]) < math.pi / n.max()]
+    return Zero(float(delta[peak[np.argmax(overlap[peak])]]), shared)
