@@ -31,7 +31,6 @@ NAMED = 0.95  # share of what faults alone leave that effects must explain to be
 OWN_SHARE = 0.5  # of a gain that must go when the effect alone is switched off
 ALIKE = 0.6  # share by which two models may leave more or less and be alike: laws are approximations
 NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
-N_TURNS = 3  # of estimating faults and the noise at them
 CLOSE = 0.5  # share of what was left, from which another turn is not worth it
 CHANCE = 0.02  # difference in misfit that seeds make
 SAME = 0.05  # difference in held-out misfit up to which fewer causes are preferred
@@ -80,8 +79,7 @@ def examine(
     ema = EmaPlant(plant, data, n_threads)
     say("switching noise")
     search = Search(ema, Noise(ema, {}), train, heldout, say)
-    before = _faults_only(search)
-    before, v = _surely(search, before, search.verdict(before), conditions)
+    before, v = _surely(search, *_faults_only(search), conditions)
     verdict_before = v
     say(f"faults only: p = {v.p_value:.2g}, most visible: {v.loudest}")
     alike: list[tuple[str, ...]] = []
@@ -100,18 +98,19 @@ def examine(
     return Examination(findings, search, before, after, verdict_before, v)
 
 
-def _faults_only(search: Search) -> Model:
+def _faults_only(search: Search) -> tuple[Model, Verdict]:
     """The model with faults alone: what they make of the noise weighs what tells them, so both are found in turn."""
     model = start_model(search)
-    for _ in range(N_TURNS):
-        if max(model.fit.point.get(name, 0.0) for name in FAULTS) < FAULT_ALARM:
-            break
+    if max(model.fit.point.get(name, 0.0) for name in FAULTS) < FAULT_ALARM:
+        return model, search.verdict(model)
+    while True:
         left = model.excess
         search.noise = Noise(search.plant, model.fit.point)
+        model = search.model((), model.fit.free, model.fit.point, model.fit.columns, 1)
+        v = search.verdict(model)
+        if v.is_noise or model.excess < NEARLY or model.excess > CLOSE * left:
+            return model, v
         model = search.model((), model.fit.free, model.fit.point, None, 6)
-        if model.excess > CLOSE * left:
-            break
-    return model
 
 
 def _grown(
