@@ -96,6 +96,11 @@ def table(rows: list[dict[str, Any]]) -> str:
         inside = [x for row in hiding for x in row["covered"].values()]
         lines.append(f"right or in the set: {_rate(good, len(hiding))}; confidently wrong: {_rate(bad, len(hiding))}")
         lines.append(f"95 % intervals of parameters that hold the truth: {_rate(sum(inside), len(inside))}")
+        known = [row for row in hiding if row["outcome"] == "right" and not cases.CASES[row["case"]].outside]
+        close = sum(row["err_after"] <= 1.2 * row["noise_floor"] for row in known)
+        lines.append(f"held-out err_i within 1.2 noise floors where named right: {_rate(close, len(known))}")
+    cpu = [row["cpu_s"] for row in rows]
+    lines.append(f"processor time of a trial: median {np.median(cpu):.0f} s, largest {max(cpu):.0f} s")
     if alarms:
         lines.append(
             f"false alarms without an effect: {_rate(sum(row['verdict'] != 'adequate' for row in alarms), len(alarms))}"

@@ -13,7 +13,7 @@ from .fit import N_SEEDS, SEED, residuals
 from .noise import Noise
 from .plant import EmaPlant, Point
 
-STEPS = (2.5e-7, 5e-7, 1e-6, 2e-6, 4e-6)  # [s]
+STEPS = (2.5e-7, 5e-7, 1e-6, 1.5e-6, 2e-6, 3e-6, 4e-6, 5e-6)  # [s] roughly: a whole number makes a control period
 AROUND = (1.0, 1.25, 0.8)  # times the step, for the noise: what is left unknown of it
 CLEAR = 0.7  # share of what is left that another step may leave to be taken instead
 
@@ -26,7 +26,8 @@ def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]
         return max(noise.misfit(list(left.values()), cycles) - 1.0, 0.0)
 
     now = excess(None)
-    left, best = min((excess((step,)), step) for step in STEPS)
+    T = 1.0 / plant.plant.control.rate
+    left, best = min((excess((step,)), step) for step in (T / round(T / about) for about in STEPS))
     return best if left < CLEAR * now else None
 
 

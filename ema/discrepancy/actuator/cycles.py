@@ -23,6 +23,8 @@ MAX_LAG = 6e-3  # [s] no sensor or loop of this plant is that late; channels are
 MAX_CLIPPED = 0.1  # share of samples at the largest value
 AT_REST_SPEED = 0.1  # [rad/s]
 START_SAMPLES = 10
+HIDDEN = 2e-5  # [rad rms] noise of the rotor angle that its own motion hides
+MEDIAN_OF_NORMAL = 0.6745  # of |x| where x is standard normal
 AT_REST = 1e-3  # [s] at the start of a cycle, over which the position is averaged
 
 
@@ -54,6 +56,8 @@ class Measured:
     has_temperature : bool
     angle_step : float
         Resolution of the recorded rotor angle, 0 if finer than can be seen. [rad]
+    angle_noise : float
+        White noise of the recorded rotor angle, 0 if less than its motion hides. [rad rms]
     """
 
     labels: tuple[str, ...]
@@ -68,6 +72,7 @@ class Measured:
     dT: Array
     has_temperature: bool
     angle_step: float
+    angle_noise: float
 
     @property
     def n_cycles(self) -> int:
@@ -118,6 +123,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
         dT,
         with_temperature,
         _step(np.concatenate([cycle["theta_m"] for _, cycle in everything])),
+        _white_noise([s.theta_m[0] for s in signals]),
     )
 
 
@@ -147,7 +153,7 @@ def _speed_at_start(theta_m: Array, rate: float) -> float:
 
     From rest the second difference is at least three times the first; what moves already has two alike.
     """
-    step = _step(theta_m)
+    step = _step(theta_m) or 4.0 * _white_noise([theta_m])
     m = START_SAMPLES if step else 1
     first, second = float(theta_m[m] - theta_m[0]), float(theta_m[2 * m] - theta_m[m])
     w = (3.0 * first - second) * rate / (2.0 * m)
@@ -165,6 +171,15 @@ def _step(x: Array) -> float:
         return 0.0
     off = np.diff(values) / step
     return step if np.abs(off - np.round(off)).max() < 0.02 else 0.0
+
+
+def _white_noise(channels: Sequence[Array]) -> float:
+    """Rms of what is white in an angle, from fourth differences by their median; 0 where it is less than HIDDEN."""
+    differences = np.concatenate([np.diff(x, 4) for x in channels])
+    rms = float(np.median(np.abs(differences))) / MEDIAN_OF_NORMAL / np.sqrt(70.0)  # 70 = 1² + 4² + 6² + 4² + 1²
+    step = _step(np.concatenate(list(channels)))
+    white = np.sqrt(max(rms**2 - step**2 / 12.0, 0.0))
+    return float(white) if white > max(HIDDEN, step) else 0.0
 
 
 def _check_rate(where: str, cycle: Cycle, plant: Actuator) -> None:

@@ -114,6 +114,9 @@ class EmaPlant:
                 n_threads=self.n_threads,
             )
             theta_m = r.theta_m
+            if d.angle_noise:
+                white = [np.random.default_rng([seed, 1]).standard_normal(theta_m.shape[1]) for seed in seeds[part]]
+                theta_m = theta_m + d.angle_noise * np.array(white)
             if d.angle_step:
                 theta_m = d.angle_step * np.round(theta_m / d.angle_step)
             u_dc = r.u_dc if d.signals[cycles[0]].u_dc is not None else None
