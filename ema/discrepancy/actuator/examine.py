@@ -166,14 +166,17 @@ def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ..
     """`model`, or where it leaves little, one with an effect for several faults that leaves no more."""
     if not v.is_noise and model.excess > NEARLY:
         return model, v
-    for m in search.instead_of_faults(model):
-        w = search.verdict(m)
-        if m.heldout < model.heldout + SAME and (w.is_noise or not v.is_noise):
-            gone = [name for name in FAULTS if name not in {f.name for f in m.fit.free}]
-            alike.append((f"{' and '.join(gone)} alike",))
-            search.say(f"{m.names[-1]} instead of {', '.join(gone)}: p = {w.p_value:.2g}")
-            return m, w
-    return model, v
+    simpler = [m for m in search.instead_of_faults(model) if m.heldout < model.heldout + SAME]
+    verdicts = [search.verdict(m) for m in simpler]
+    as_good = [(m, w) for m, w in zip(simpler, verdicts, strict=True) if w.is_noise or not v.is_noise]
+    if not as_good:
+        return model, v
+    m, w = as_good[0]
+    gone = [name for name in FAULTS if name not in {f.name for f in m.fit.free}]
+    rivals = [n.names[-1] for n, _ in as_good[1:] if n.heldout - m.heldout < ALIKE * m.excess + CHANCE]
+    alike.append((f"{' and '.join(gone)} alike", *rivals))
+    search.say(f"{m.names[-1]} instead of {', '.join(gone)}: p = {w.p_value:.2g}")
+    return m, w
 
 
 def _without_superfluous(

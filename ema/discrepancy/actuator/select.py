@@ -41,6 +41,7 @@ N_REFINED = 4
 WORTH_A_FIT = 0.9  # share of the squared residual a candidate may leave, to first order
 N_REFINED_AT_LEAST = 2
 NO_WORSE = 1.5  # times the squared residual of the best start, from which a start with fewer faults is not preferred
+ONE_CAUSE = 0.25  # relative spread up to which several parameters are one cause
 K_SEEN = 0.01  # a fault that is there
 NEAR_NOISE = 0.05  # excess below which a fit need not go on
 MAX_EFFECTS = 3
@@ -209,14 +210,17 @@ class Search:
             faults = [name for name in registry()[c.effect].mistaken_for if name in FAULTS]
             common = min((k.get(name, 0.0) for name in faults), default=0.0)
             gone = [name for name in faults if k.get(name, 0.0) - common < K_SEEN]
-            if c.effect in model.names or len(c.linear) > 1 or common < K_SEEN or len(gone) < 2:
+            if c.effect in model.names or common < K_SEEN or len(gone) < max(2, len(c.linear)):
                 continue
             self.probe([c])
             rest = {name: 0.0 if name in gone else k[name] - common for name in faults}
             less = Model(model.effects, replace(model.fit, point={**k, **rest}), model.heldout)
             start = self.start_without(less, c, gone)
             frees = tuple(f for f in model.fit.free if f.name not in gone)
-            found.append(self.model((*model.effects, c), (*frees, *c.frees), start, model.fit.columns, 3))
+            made = self.model((*model.effects, c), (*frees, *c.frees), start, model.fit.columns, 3)
+            values = np.array([made.fit.point[f"{c.effect}.{name}"] for name in c.linear])
+            if np.ptp(values) <= ONE_CAUSE * abs(values.mean()):
+                found.append(made)
         return sorted(found, key=lambda m: m.heldout)
 
     def _close(self, refined: dict[str, Model]) -> list[tuple[str, Model]]:
