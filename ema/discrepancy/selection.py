@@ -16,6 +16,7 @@ N_LEADING = 3  # candidates fitted with all parameters where slopes were frozen
 MIN_PARTS = 40  # parts over which gains are compared in pairs
 ODDS = 5.0  # difference in log-likelihood (150 : 1) from which one explanation is preferred
 NEARLY_NOISE = 1.1  # scale of a residual below which likelihoods can be taken at their word
+EXPLAINED = 1.2  # held-out residual over noise up to which a model counts as explaining the data
 SIGNIFICANT = 2.5  # standard errors a mean gain must be above zero
 MIN_SHARE = 0.02  # of the residual above noise that a further effect must explain
 MIN_SHARE_OF_TERM = 0.05
@@ -232,6 +233,9 @@ def above_noise(tried: Tried) -> float:
 
 def is_worth_it(new: Tried, old: Tried) -> bool:
     """A further effect must be significant and explain a share of what is not noise; a nameless term a larger one."""
+    gain = compare(new, old)
+    # what shows in a few parts only (a stretch passed twice) is believed where it leaves nearly noise of what was more
+    settles = new.rms <= EXPLAINED < old.rms and gain.gain > ODDS
     share = (above_noise(old) - above_noise(new)) / max(above_noise(old), 1e-12)
     nameless = len(new.accepted) > len(old.accepted) and new.accepted[-1].is_structure
-    return compare(new, old).is_significant and share > (MIN_SHARE_OF_TERM if nameless else MIN_SHARE)
+    return (gain.is_significant or settles) and share > (MIN_SHARE_OF_TERM if nameless else MIN_SHARE)

@@ -11,6 +11,7 @@
 `cogging`       the order scan
 `gear`          the scan for a resonance of a gear that gives
 `zeros`         angle zeros of records given together
+`stretch`       the search for a stretch of other friction
 `structure`     terms suggested by the torque residual when no effect explains it
 `plant`         all of it as the engine's `Plant`
 ==============  =====================================================================================

@@ -14,6 +14,7 @@ from ema.models.axis_config import LinearAxis
 
 from .cogging import cogging_candidate
 from .gear import gear_candidate
+from .stretch import stretch_candidate
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -90,7 +91,11 @@ def library(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candi
     """Every effect of the library that has a meaning for this axis and its channels."""
     s = sizes(plant)
     found = [c for name in registry() if (c := _candidate(plant, s, name, point)) is not None]
-    searched = (cogging_candidate(plant, point, blocks), gear_candidate(plant, point, blocks))
+    searched = (
+        cogging_candidate(plant, point, blocks),
+        gear_candidate(plant, point, blocks),
+        stretch_candidate(plant, s, point, blocks),
+    )
     return [*found, *(c for c in searched if c is not None)]
 
 
@@ -140,16 +145,6 @@ def _quadratic(plant: AxisPlant, s: Sizes) -> _Spec:
 def _stribeck(plant: AxisPlant, s: Sizes) -> _Spec:
     w = s.speed
     return {"excess": (0.0, 3.0, (0.3,), 0.1), "speed": (0.01 * w, w, (0.03 * w, 0.1 * w, 0.3 * w), 0.05 * w)}
-
-
-def _position_friction(plant: AxisPlant, s: Sizes) -> _Spec:
-    x, h = s.centre, s.half_range
-    centres = [x + f * h for f in (-0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75)]
-    return {
-        "height": (-0.95, 10.0, (0.5,), 0.1),
-        "centre": (x - h, x + h, centres, 0.1 * h),
-        "width": (0.02 * h, h, (0.1 * h, 0.3 * h), 0.05 * h),
-    }
 
 
 def _spring(plant: AxisPlant, s: Sizes) -> _Spec | None:
@@ -236,7 +231,6 @@ _BUILDERS: dict[str, Callable[[AxisPlant, Sizes], _Spec | None]] = {
     "quadratic_drag": _quadratic,
     "stribeck": _stribeck,
     "asymmetric_friction": lambda plant, s: {"asymmetry": (-0.95, 0.95, (0.1,), 0.05)},
-    "position_friction": _position_friction,
     "load_friction": lambda plant, s: {"per_torque": (0.0, 20.0 / s.torque, (0.2 / s.torque,), 0.1 / s.torque)},
     "constant_load": lambda plant, s: {
         "torque": (-3.0 * s.torque, 3.0 * s.torque, (0.02 * s.torque,), 0.02 * s.torque)

@@ -45,12 +45,8 @@ def search(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candid
     weak = thinned(weak_form(plant, point, blocks))
     if len(weak.y) < 30:
         return []
-    y = weak.y / weak.sigma
     m = weak.motion
-    always = [np.ones(len(m.theta)), np.sign(m.direction), m.w]
-    columns = [*(weak.integrate(f) / weak.sigma for f in always), weak.inertia / weak.sigma]
-    q, _ = np.linalg.qr(np.stack(columns, axis=1))
-    rest = y - q @ (q.T @ y)
+    q, rest = weak.beside()
     best: dict[str, tuple[float, Term, Array]] = {}
     for family, terms in _families(m, sizes(plant), _own_frequency(plant)).items():
         for gain, term, coefficients in _gains(weak, terms, q, rest):

@@ -78,6 +78,15 @@ class Weak:
         """∫ φ_k f dt of values at the motion's samples, shape (n_samples,) or (n_samples, n_columns)."""
         return np.asarray(self._matrix @ f)
 
+    def beside(self) -> tuple[Array, Array]:
+        """Orthonormal columns (n_y, 4) of a constant, friction, drag, inertia over σ, and what y/σ has beside them."""
+        m = self.motion
+        always = [np.ones(len(m.theta)), np.sign(m.direction), m.w]
+        columns = [*(self.integrate(f) / self.sigma for f in always), self.inertia / self.sigma]
+        q, _ = np.linalg.qr(np.stack(columns, axis=1))
+        y = self.y / self.sigma
+        return q, y - q @ (q.T @ y)
+
     def __getitem__(self, chosen: np.ndarray) -> Weak:
         columns = (self.y[chosen], self.sigma[chosen], self.inertia[chosen])
         return Weak(*columns, self.motion, self.index[chosen], self.weight[chosen], self.block[chosen])
