@@ -12,7 +12,6 @@ from .fitting import Fit, fit, jacobian
 from .outcome import Gain, Outcome, RecordGain
 from .plant import Candidate, Errors, Free, Plant, Point
 from .selection import (
-    EXPLAINED,
     FORM,
     Progress,
     Tried,
@@ -36,6 +35,7 @@ MAX_TERMS = 3
 MAX_ADDED = 5  # of both kinds, further lines of a kind that is there already counted too
 MANY = 12  # free parameters from which an effect is revised beside its strongest rivals only
 N_RIVALS = 6
+EXPLAINED = 1.2  # held-out residual over noise up to which a model counts as explaining the data
 MIMICKED = 0.02  # of an effect's mark in power, where less is left of it beside the base parameters it cannot be seen
 
 

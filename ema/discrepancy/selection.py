@@ -16,8 +16,8 @@ N_LEADING = 3  # candidates fitted with all parameters where slopes were frozen
 MIN_PARTS = 40  # parts over which gains are compared in pairs
 ODDS = 5.0  # difference in log-likelihood (150 : 1) from which one explanation is preferred
 NEARLY_NOISE = 1.1  # scale of a residual below which likelihoods can be taken at their word
-EXPLAINED = 1.2  # held-out residual over noise up to which a model counts as explaining the data
 SIGNIFICANT = 2.5  # standard errors a mean gain must be above zero
+FEW_PARTS, MAX_LOSS = 4, 0.05  # parts that must gain more than `ODDS`, and losses elsewhere over all gains
 MIN_SHARE = 0.02  # of the residual above noise that a further effect must explain
 MIN_SHARE_OF_TERM = 0.05
 FORM = 0.17  # what the laws of the library are off by, relative: a Lorentzian for an exponential Stribeck curve, say
@@ -62,13 +62,13 @@ class Comparison:
 
     gain: float
     error: float
-
     scale: float
+    is_local: bool = False  # several parts gain and hardly any loses: a stretch that is passed a few times
 
     @property
     def is_significant(self) -> bool:
         """Better by more than chance. Where something is left unexplained, likelihoods alone promise too much."""
-        return self.gain > max(ODDS, SIGNIFICANT * self.error)
+        return self.gain > max(ODDS, SIGNIFICANT * self.error) or self.is_local
 
     @property
     def is_clear(self) -> bool:
@@ -85,7 +85,8 @@ def compare(one: Tried, other: Tried, scale: float | None = None) -> Comparison:
         gains += [float(part.sum()) for part in np.array_split(a - b, parts)]
     d = np.array(gains)
     error = float(np.std(d, ddof=1) * np.sqrt(len(d))) if len(d) > 1 else np.inf
-    return Comparison(float(d.sum()), error, scale)
+    is_local = bool((d > ODDS).sum() >= FEW_PARTS and -d[d < 0.0].sum() < MAX_LOSS * d[d > 0.0].sum())
+    return Comparison(float(d.sum()), error, scale, is_local)
 
 
 Progress = Callable[[str], None]
@@ -233,9 +234,6 @@ def above_noise(tried: Tried) -> float:
 
 def is_worth_it(new: Tried, old: Tried) -> bool:
     """A further effect must be significant and explain a share of what is not noise; a nameless term a larger one."""
-    gain = compare(new, old)
-    # what shows in a few parts only (a stretch passed twice) is believed where it leaves nearly noise of what was more
-    settles = new.rms <= EXPLAINED < old.rms and gain.gain > ODDS
     share = (above_noise(old) - above_noise(new)) / max(above_noise(old), 1e-12)
     nameless = len(new.accepted) > len(old.accepted) and new.accepted[-1].is_structure
-    return (gain.is_significant or settles) and share > (MIN_SHARE_OF_TERM if nameless else MIN_SHARE)
+    return compare(new, old).is_significant and share > (MIN_SHARE_OF_TERM if nameless else MIN_SHARE)
