@@ -1,13 +1,9 @@
 """Remaining life: calibrated on simulated histories, silent where the trend says nothing."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from ema_postflight.prognosis import MIN_POINTS, Trend, prognosis
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
 from benchmarks import prognosis as bench
 
 

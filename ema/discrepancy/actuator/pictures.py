@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ema.discrepancy.report import Picture, picture
 
@@ -88,7 +89,7 @@ def _dependence(torques: list[list[Torque]]) -> Picture:
     quantities = (
         ("rotor angle, one turn [rad]", lambda c: c.averaged(c.theta_m) % (2.0 * np.pi)),
         ("speed [rad/s]", lambda c: c.averaged(c.w_m)),
-        ("user position [rad]", lambda c: c.averaged(c.theta_u)),
+        ("user position [mrad]", lambda c: 1e3 * c.averaged(c.theta_u)),
         ("motor current [A]", lambda c: c.current),
     )
     for ax, (name, quantity) in zip(axes.flat, quantities, strict=True):
@@ -99,6 +100,7 @@ def _dependence(torques: list[list[Torque]]) -> Picture:
             middle, mean = _binned(x, y)
             ax.plot(middle, 1e3 * mean, color=colour, lw=1.8)
         ax.set_xlabel(name)
+        ax.xaxis.set_major_locator(MaxNLocator(6))
         ax.set_ylabel("residual torque [mN m]")
         ax.axhline(0.0, color="k", lw=0.5)
         every = np.concatenate([c.r for c in torques[0]])
