@@ -87,25 +87,57 @@ def rate_outside(answer: dict[str, Any]) -> str:
     return "right" if answer["verdict"] == "unexplained" else "missed"
 
 
+def parameter_error(answer: dict[str, Any]) -> float:
+    """Relative error of the first parameter of a hidden effect that was named; NaN where none was."""
+    for name, _, _, values in answer["effects"]:
+        for key, true in list(answer["truth"].get(name, {}).items())[:1]:
+            if key in values:
+                return abs(values[key] / true - 1.0)
+    return float("nan")
+
+
+def interval(count: int, n: int) -> str:
+    """Share with its interval of 95 % (Clopper and Pearson)."""
+    low, high = stats.binomtest(count, n).proportion_ci(0.95)
+    return f"{count} of {n} ({100 * low:.1f} to {100 * high:.1f} %)"
+
+
 def table(answers: list[dict[str, Any]]) -> None:
     """Print what was found."""
+    import hidden_axis
+
     none = [a for a in answers if a["hidden"] == NOTHING]
     if none:
-        alarms = sum(a["verdict"] != "adequate" for a in none)
-        low, high = stats.binomtest(alarms, len(none)).proportion_ci(0.95)
-        print(f"nothing hidden: {alarms} alarms in {len(none)} seeds, rate {low:.3f} to {high:.3f} (95 %)")
-    print(f"{'hidden':32}{'seeds':>6}" + "".join(f"{c:>17}" for c in COLUMNS) + f"{'rms after':>11}{'after/floor':>13}")
+        print("nothing hidden, alarms:", interval(sum(a["verdict"] != "adequate" for a in none), len(none)))
+    print(
+        f"{'hidden':32}{'seeds':>6}"
+        + "".join(f"{c:>17}" for c in COLUMNS)
+        + f"{'parameter':>11}{'rms after':>11}{'err/floor':>11}{'F_d before':>12}{'after':>8}"
+    )
+    within = {True: [0, 0, 0], False: [0, 0, 0]}  # library or not: right or in two, wrong, all
     for hidden in dict.fromkeys(a["hidden"] for a in answers if a["hidden"] != NOTHING):
         mine = [a for a in answers if a["hidden"] == hidden]
         names = hidden.split("+")
         outside = any(name in hidden_axis.OUTSIDE for name in names)
         rated = [rate_outside(a) if outside else rate(a, names) for a in mine]
+        for k, which in enumerate((("right", "in two"), ("wrong", "with a wrong one"), COLUMNS)):
+            within[not outside][k] += sum(r in which for r in rated)
+        errors = [e for a in mine if np.isfinite(e := parameter_error(a))]
+        friction = 100.0 * np.median(np.abs([a["friction"] for a in mine]), axis=0)
         print(
             f"{hidden:32}{len(mine):6d}"
             + "".join(f"{rated.count(c):17d}" for c in COLUMNS)
+            + (f"{100 * np.median(errors):10.1f}%" if errors else f"{'':11}")
             + f"{np.median([a['rms'][1] for a in mine]):11.2f}"
-            + f"{np.median([a['error'][1] / a['error'][2] for a in mine]):13.2f}"
+            + f"{np.median([a['error'][1] / a['error'][2] for a in mine]):11.2f}"
+            + f"{friction[0]:11.1f}%{friction[1]:7.1f}%"
         )
+    for library, (good, wrong, n) in within.items():
+        if n:
+            print(
+                "library:" if library else "outside:", "right or in two", interval(good, n), "wrong", interval(wrong, n)
+            )
+    print("code:", ", ".join(sorted({a["code"] for a in answers})))
 
 
 def main() -> None:
