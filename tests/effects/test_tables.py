@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.discrepancy.extension import as_extension
+from ema.discrepancy.actuator.features import Signals, features
+from ema.discrepancy.actuator.structure import structure
+from ema.discrepancy.actuator.weak import torque as weak_torque
+from ema.discrepancy.extension import TABLES, as_extension
 from ema.effects import registry
 from ema.effects.table import KNOTS, tabulated
 from ema.models import hf
@@ -65,6 +68,34 @@ def test_a_torque_proportional_to_speed_is_viscous_drag(shipped_plant):
     means, noise = [r.mean(axis=0) for r in runs], np.sqrt(np.mean([r.var(axis=0) for r in runs]) / 16)
     assert np.sqrt(np.mean((means[0] - means[1]) ** 2)) < 1.5 * noise
     assert np.sqrt(np.mean((means[0] - means[2]) ** 2)) > 10.0 * noise
+
+
+@pytest.mark.parametrize(
+    ("quantity", "places", "torque"),
+    [("position", [-5e-3, 0.0, 5e-3], [0.012, -0.012, 0.006]), ("speed", [-250.0, 0.0, 250.0], [0.015, 0.0, 0.015])],
+)
+def test_what_the_residual_shows_of_a_table_is_that_table(shipped_plant, quantity, places, torque):
+    """A torque put into the simulation, the structure of the torque balance's residual, and back to a table."""
+    name, n = TABLES[quantity], 16
+    hidden = {name: tabulated(places, torque)}
+    runs = [
+        hf.simulate(shipped_plant, np.zeros((n, 6)), seeds=np.arange(n) + first, effects=effects)
+        for first, effects in ((0, hidden), (100, {}))
+    ]
+    command = np.broadcast_to(shipped_plant.command(), runs[0].theta_m.shape)
+    signals = [Signals(r.i, r.theta_m, r.theta_u, command, None) for r in runs]
+    tau = [features(shipped_plant, s)["torque"] for s in signals]
+    one = Signals(*(x[:1] for x in (signals[0].i, signals[0].theta_m, signals[0].theta_u, command)), None)
+    r, sd = tau[0].mean(axis=0) - tau[1].mean(axis=0), tau[1].std(axis=0) / np.sqrt(n) + 1e-5
+    found = structure(
+        [weak_torque(one, r, sd, shipped_plant.control.rate)], shipped_plant.control.rate, {"torque": 9.0}
+    )
+    effects = as_extension(found)
+    assert set(effects) == {name}
+    argument = {"position": "theta_u", "speed": "w_m"}[quantity]
+    for x in 0.7 * np.linspace(places[0], places[-1], 7):
+        told, true = (law(name, **{argument: x})(values) for values in (effects[name], hidden[name]))
+        assert told == pytest.approx(true, abs=0.25 * np.ptp(torque))
 
 
 STRUCTURE = {

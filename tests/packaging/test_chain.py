@@ -14,13 +14,16 @@ import sys
 import numpy as np
 import pytest
 import yaml
+from ema_offline_builder.config import Builder
+from ema_offline_builder.nuisance import resolve
 from hidden_traffic import watched
 
 from ema import bundle as bundles
-from ema.core import resources
+from ema.core import config, resources
 from ema.core.csv_records import write_csv
 from ema.core.records import Cycle, Record
 from ema.log import LogReader
+from ema.models.actuator import Actuator
 
 FLUX, K = -0.06, np.array([0.03, 0.0, 0.0, 0.0, 0.0, 0.0])
 N_FLOWN = 5
@@ -88,6 +91,16 @@ def test_estimates_become_better(folder, before, method):
     after = err_k(ema("identify", "--method", method, folder / "flight.csv", "--bundle", folder / "bundle", "--json"))
     print(f"{method}: err_k {before:.4f} -> {after:.4f}")
     assert after < 0.25 * before
+
+
+def test_what_was_found_can_be_carried_beside_the_faults_as_sure_as_it_was_found(folder, coarse_bundle):
+    carried = [{"parameter": "magnet_flux.change", "sd": "interval"}]
+    builder = Builder.model_validate(coarse_bundle.manifest["builder"] | {"nuisance": carried})
+    plant = config.load(folder / "found/extended.yaml", Actuator)
+    nuisance, (low, high) = resolve(builder, plant), plant.intervals["magnet_flux"]["change"]
+    assert nuisance.centre == pytest.approx([FLUX], abs=0.002)
+    assert nuisance.sd == pytest.approx([(high - low) / 3.92])
+    assert low <= nuisance.centre[0] <= high
 
 
 def test_false_alarms_end(folder, coarse_bundle, hidden):

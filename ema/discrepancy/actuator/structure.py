@@ -11,6 +11,7 @@ from .features import Array
 from .weak import Torque, line, lines, share_explained
 
 N_BINS = 12
+LEAST_NODES = 3.0  # in a part of a function, for its mean to be told
 WORTH_SAYING = 0.3  # share of the residual torque
 FREQUENCIES = np.arange(5.0, 450.0, 0.5)
 
@@ -38,6 +39,23 @@ def _share_by_cycle(cycles: Sequence[Torque], terms: Callable[[Torque], Array]) 
     return float(np.average(shares, weights=power)) if sum(power) > 0.0 else 0.0
 
 
+def function(
+    cycles: Sequence[Torque], of: str, signal: Callable[[Torque], Array], low: float, high: float
+) -> dict[str, Any]:
+    """The residual torque as a function of one signal: its mean in each part of the range that was passed through.
+
+    Returns
+    -------
+    function : dict
+        ``of``; ``at``, the parts' middles; ``torque`` there, opposing positive motion [N m]; ``share`` explained.
+    """
+    terms = _bins(signal, low, high)
+    share, torque = share_explained(cycles, terms)
+    seen = sum(np.asarray(c.averaged(terms(c)).sum(axis=1)) for c in cycles) > LEAST_NODES
+    middle = low + (np.arange(N_BINS) + 0.5) * (high - low) / N_BINS
+    return {"of": of, "at": middle[seen].tolist(), "torque": torque[seen].tolist(), "share": round(float(share), 3)}
+
+
 def structure(cycles: Sequence[Torque], rate: float, scores: dict[str, float]) -> dict[str, Any]:
     """Orders, frequencies and dependences of the residual torque, and where in the actuator it stands out.
 
@@ -56,11 +74,14 @@ def structure(cycles: Sequence[Torque], rate: float, scores: dict[str, float]) -
     speed = max(float(np.abs(c.w_m).max()) for c in cycles)
     position = [min(c.theta_u.min() for c in cycles), max(c.theta_u.max() for c in cycles)]
     turn: Callable[[Torque], Array] = lambda c: c.theta_m % (2.0 * np.pi)  # noqa: E731
+    functions = [
+        function(cycles, "speed", lambda c: c.w_m, -speed, speed),
+        function(cycles, "position", lambda c: c.theta_u, float(position[0]), float(position[1])),
+        function(cycles, "rotor angle", turn, 0.0, 2.0 * np.pi),
+    ]
     dependence = {
         "sign of speed": share_explained(cycles, lambda c: smooth_sign(c)[None])[0],
-        "speed": share_explained(cycles, _bins(lambda c: c.w_m, -speed, speed))[0],
-        "position": share_explained(cycles, _bins(lambda c: c.theta_u, float(position[0]), float(position[1])))[0],
-        "rotor angle": share_explained(cycles, _bins(turn, 0.0, 2.0 * np.pi))[0],
+        **{f["of"]: f["share"] for f in functions},
     }
     loudest = sorted(scores, key=lambda name: -scores[name])
     said = [f"most visible in the {' and '.join(n for n in loudest if n != 'all')[:40].rsplit(' and', 1)[0]} balance"]
@@ -78,4 +99,5 @@ def structure(cycles: Sequence[Torque], rate: float, scores: dict[str, float]) -
         "orders": orders,
         "frequencies": [{"frequency": float(FREQUENCIES[peak]), "share": float(tones[peak])}],
         "dependence": {name: round(float(share), 3) for name, share in dependence.items()},
+        "functions": [f for f in functions if f["share"] > WORTH_SAYING],
     }
