@@ -44,6 +44,8 @@ def test_more_friction_is_fitted_and_not_called_an_effect(axis_bench, hidden_axi
         ("cogging", "order", 1e-9),
         ("speed_delay", "time", 0.05),
         ("magnet_flux", "change", 0.1),
+        ("gear_compliance", "compliance", 0.1),
+        ("supply_sag", "resistance", 0.05),
     ],
 )
 def test_a_hidden_effect_is_named_measured_and_held_out_error_falls(
