@@ -41,6 +41,7 @@ def trial(name: str, seed: int, n_cycles: int, *, varied: bool = True, n_threads
     findings = examine(plant, measured(plant, [record]), n_threads=n_threads).findings.as_dict()
     found = {f"{e['name']}.{p}": q for e in findings["effects"] for p, q in e["parameters"].items()}
     true = {p: truth(values) for p, truth in cases.CASES[name].parameters.items() if p in found}
+    sd = {p: (found[p]["high"] - found[p]["low"]) / 3.92 for p in true}
     gain = findings["gain"]
     outcome = cases.outcome(name, findings)
     return {
@@ -49,6 +50,7 @@ def trial(name: str, seed: int, n_cycles: int, *, varied: bool = True, n_threads
         "named": [[e["name"], *e["indistinguishable_from"]] for e in findings["effects"]], "hidden": values, "k": k,
         "confidence": [e["confidence"] for e in findings["effects"]],
         "parameter_errors": {p: found[p]["value"] / x - 1.0 for p, x in true.items()},
+        "z": {p: (found[p]["value"] - x) / sd[p] for p, x in true.items() if sd[p] > 0.0},
         "covered": {p: found[p]["low"] <= x <= found[p]["high"] for p, x in true.items()}, **gain["heldout"],
         "err_k_before": _err_k(gain["k_before"], k), "err_k_after": _err_k(gain["k_after"], k),
         "false_alarms": [gain["false_alarms_before"], gain["false_alarms_after"]], "cpu_s": time.process_time() - begun,

@@ -260,9 +260,13 @@ def _integer(fit: Fit) -> bool:
 
 
 def interval(fit: Fit, name: str) -> float:
-    """Standard deviation of a parameter, as much larger as the fit is worse than noise."""
+    """Standard deviation of a parameter, as much larger as the fit is worse than noise.
+
+    Cycles of one motion share what the integration step makes of them: they count as one.
+    """
     j = [f.name for f in fit.free].index(name)
-    return float(np.sqrt(fit.covariance[j, j] * max(fit.misfit, 1.0)))
+    repeated = len(fit.residuals) / len({motion for motion, _ in fit.columns})
+    return float(np.sqrt(fit.covariance[j, j] * repeated * max(fit.misfit, 1.0)))
 
 
 def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...], told_as: str = "") -> FoundEffect:

@@ -192,6 +192,11 @@ def fit(
             at.clear()  # old columns may be to blame
         if (not improved or gained < 0.001 * cost) and was_fresh:
             break
+    # Near the optimum what seeds make of the cost hides what a step gains; the step itself is known far better.
+    last, _ = bounded(J, np.concatenate([res[c] for c in cycles]), *bounds(frees, point))
+    if all(abs(d) <= abs(f.step) for d, f in zip(last, frees, strict=True)):
+        point = moved(point, frees, last)
+        res = residuals(plant, noise, point, cycles)
     information = J.T @ J
     covariance = np.linalg.pinv(information + 1e-12 * np.trace(information) / len(J.T) * np.eye(len(J.T)))
     found = [res[c] for c in cycles]
