@@ -36,8 +36,8 @@ def parameters(unit: str, reach: float, quantity: str) -> tuple[Parameter, ...]:
     """Ends of the table, which lie within ±`reach`, and the torque at each knot."""
     part = 0.1 * reach
     ends = (
-        Parameter("low", unit, -part, -reach, 0.0, -part, f"{quantity} of the first value"),
-        Parameter("high", unit, part, 0.0, reach, part, f"{quantity} of the last value"),
+        Parameter("low", unit, -part, -reach, reach, -part, f"{quantity} of the first value"),
+        Parameter("high", unit, part, -reach, reach, part, f"{quantity} of the last value"),
     )
     start = 0.01
     return ends + tuple(

@@ -70,6 +70,8 @@ class Flaws(NamedTuple):
     clock_skew: float = 0.0  # the recorder's interval is longer by this share
     adc_limit: float = 30.0  # [A]
     # outside the library
+    cushion: float = 0.0  # [N m/rad² at the user] a spring that stiffens from cushion_begin on
+    cushion_begin: float = 1e-3  # [rad at the user]
     line: float = 0.0  # [N m] torque line at a non-integer order
     line_order: float = 7.37
     drag: float = 0.0  # [N m] additional dry friction that comes and goes with time
@@ -254,7 +256,7 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
             drive -= 0.2 * f.cogging * math.sin(2.0 * f.cogging_order * theta)
             drive -= f.line * math.sin(f.line_order * theta)
             drive -= f.shaker * math.sin(2.0 * math.pi * f.shaker_frequency * now)
-            gear_torque = f.load + f.spring * theta_u
+            gear_torque = f.load + f.spring * theta_u + f.cushion * max(theta_u - f.cushion_begin, 0.0) ** 2
             twist = 0.0
             if f.compliance > 0.0:
                 gap = theta / GR - theta_u

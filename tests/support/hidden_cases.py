@@ -121,6 +121,7 @@ CASES: dict[str, Case] = {
     "intermittent drag": Case(_one("drag", 0.005, 0.015), outside=True),
     "dead band": Case(_one("deadband", 5e-5, 2e-4), outside=True),
     "slow current loop": Case(_one("slew", 300.0, 1500.0), outside=True),
+    "cushion": Case(_one("cushion", 1e5, 4e5), outside=True),
     "hum on phase A": Case(_one("hum", 0.05, 0.2), outside=True),
     "shaker": Case(_one("shaker", 0.004, 0.015), outside=True),
     "weak leg": Case(_one("weak_leg", 0.01, 0.1), outside=True),
@@ -145,7 +146,7 @@ def draw_bench(hidden: Any, name: str, seed: int) -> tuple[Any, Any]:
     """Motions and bench of one trial; `hidden` is the module hidden_actuator."""
     rng = np.random.default_rng([seed, 1, *name.encode()])
     motions, bench = hidden.drawn_motions(rng), hidden.drawn_bench(rng)
-    return motions, bench._replace(position=0.0) if name == "position_friction" else bench
+    return motions, bench._replace(position=0.0) if name in ("position_friction", "cushion") else bench
 
 
 def visibility(hidden: Any, flaws: Any, n: int, seed: int, motions: Any, bench: Any) -> float:

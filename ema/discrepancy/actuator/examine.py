@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -17,6 +17,7 @@ from ema.models.actuator import Actuator
 from .comparators import find_step, take_step
 from .conditions import as_recorded
 from .cycles import Measured
+from .extension import as_extension
 from .fit import Fit
 from .noise import N_RUNS_SURE, Noise, Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
@@ -94,6 +95,8 @@ def examine(
     after, v = _simpler(search, after, v, alike)
     after, v = _without_superfluous(search, after, v, alike)
     findings = _findings(search, before, after, v, alike)
+    if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
+        findings, after = _with_function(search, findings, before, after)
     findings.notes.extend(conditions)
     return Examination(findings, search, before, after, verdict_before, v)
 
@@ -253,6 +256,23 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
     return Findings(verdict, found, _gain(search, before, after), shape, tried, notes, unnamed=unnamed)
 
 
+def _with_function(search: Search, findings: Findings, before: Model, after: Model) -> tuple[Findings, Model]:
+    """What the structure says as a function, simulated: part of the extended plant if held-out cycles gain by it."""
+    base = Model((), before.fit, before.heldout)
+    for effect, values in as_extension(findings.structure).items():
+        table = {f"{effect}.{name}": value for name, value in values.items()}
+        m = search.model((), base.fit.free, {**base.fit.point, **table}, None, 4)
+        if base.excess - m.excess < WORTH_IT * base.excess:
+            continue
+        e = registry()[effect]
+        quantities = {p.name: Quantity(values[p.name], values[p.name], values[p.name], p.unit) for p in e.parameters}
+        unnamed = [FoundEffect(effect, 0.0, (), quantities, e.said(values), e.separated_by)]
+        share = 1.0 - m.excess / base.excess
+        findings.structure["sentences"].append(f"{e.said(values)}, takes {share:.0%} of the rest")
+        return replace(findings, unnamed=unnamed, gain=_gain(search, before, m)), m
+    return findings, after
+
+
 def _integer(fit: Fit) -> bool:
     order = fit.point["cogging.order"]
     sd = interval(fit, "cogging.order")
@@ -283,9 +303,7 @@ def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...], to
             parameters[p.name] = Quantity(
                 values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
             )
-    return FoundEffect(
-        e.name, _confidence(search, model, effect), alike, parameters, e.sentence.format(**values), e.separated_by
-    )
+    return FoundEffect(e.name, _confidence(search, model, effect), alike, parameters, e.said(values), e.separated_by)
 
 
 def _confidence(search: Search, model: Model, effect: str) -> float:

@@ -217,7 +217,7 @@ class Search:
             less = Model(model.effects, replace(model.fit, point={**k, **rest}), model.heldout)
             start = self.start_without(less, c, gone)
             frees = tuple(f for f in model.fit.free if f.name not in gone)
-            made = self.model((*model.effects, c), (*frees, *c.frees), start, model.fit.columns, 3)
+            made = self.model((*model.effects, c), (*frees, *c.frees), start, None, 10)
             values = np.array([made.fit.point[f"{c.effect}.{name}"] for name in c.linear])
             if np.ptp(values) <= ONE_CAUSE * abs(values.mean()):
                 found.append(made)

@@ -10,7 +10,7 @@ import numpy as np
 from ema.effects import registry
 from ema.effects.table import tabulated
 
-from .actuator.structure import WORTH_SAYING
+from .structure import WORTH_SAYING
 
 # Effects that hold a function of one quantity. Of the rotor's angle a torque line says more than a table would.
 TABLES = {"position": "position_torque", "speed": "speed_torque"}
