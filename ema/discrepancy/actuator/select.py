@@ -43,6 +43,7 @@ N_REFINED_AT_LEAST = 2
 NO_WORSE = 1.5  # times the squared residual of the best start, from which a start with fewer faults is not preferred
 ONE_CAUSE = 0.25  # relative spread up to which several parameters are one cause
 K_SEEN = 0.01  # a fault that is there
+FAR = 100.0  # excess from which candidates are simulated before they are ranked
 NEAR_NOISE = 0.05  # excess below which a fit need not go on
 MAX_EFFECTS = 3
 
@@ -182,6 +183,8 @@ class Search:
         refined: dict[str, Model] = {}
         cost = sum(float(r @ r) for r in model.fit.residuals.values())
         screened = self.screen(model, found)
+        if model.excess > FAR:
+            screened = self._simulated(model, screened)
         for s in screened:  # one cause for several faults: tried in any case, since the faults hide what it promises
             if s.candidate.effect not in refined and self._stands_for_faults(model, s.candidate):
                 refined[s.candidate.effect] = self._refined(model, s)
@@ -223,6 +226,17 @@ class Search:
                 found.append(made)
         return sorted(found, key=lambda m: m.heldout)
 
+    def _simulated(self, model: Model, screened: Sequence[Screened]) -> list[Screened]:
+        """Candidates by what their starts leave when simulated: far from the data first order promises little."""
+        motions = self.plant.data.motion
+        cycles = [next(c for c in self.train if motions[c] == m) for m in sorted({int(motions[c]) for c in self.train})]
+        share = len(self.train) / len(cycles)
+        ranked = []
+        for s in screened:
+            start, cost = self._better([s.start, self.start_without(model, s.candidate, FAULTS)], cycles)
+            ranked.append(Screened(share * cost, s.candidate, start))
+        return sorted(ranked, key=lambda entry: entry.promised)
+
     def _close(self, refined: dict[str, Model]) -> list[tuple[str, Model]]:
         """The models near the best; none if the best stands alone and leaves nothing."""
         ranked = sorted(refined.items(), key=lambda item: item[1].heldout)
@@ -252,11 +266,11 @@ class Search:
         n = sum(len(self.plant.data.y[c]) for c in self.train)
         return promised / n > 3.0 * min(m.fit.misfit for m in refined.values()) + 0.5
 
-    def _better(self, starts: Sequence[Point]) -> tuple[Point, float]:
-        """The start that simulates closest to the training cycles, and its squared residual."""
+    def _better(self, starts: Sequence[Point], cycles: Sequence[int] | None = None) -> tuple[Point, float]:
+        """The start that simulates closest to the cycles (the training cycles), and its squared residual."""
 
         def cost(point: Point) -> float:
-            left = residuals(self.plant, self.noise, point, self.train, N_GLANCE)
+            left = residuals(self.plant, self.noise, point, cycles or self.train, N_GLANCE)
             return sum(float(r @ r) for r in left.values())
 
         return min(((point, cost(point)) for point in starts), key=lambda entry: entry[1])
