@@ -32,6 +32,7 @@ from ema.models.actuator import Actuator
 Array = NDArray[np.float64]
 
 SECTORS = 24  # per electrical turn
+FEW = 20.0  # samples in a sector from which its mean counts half
 I_SIGN = 0.3  # [A] current at which its sign is taken for half certain
 MAX_NODES = 800
 SETTLING = 5e-3  # [s] left out at the start of a cycle: what current the controller held before it is not known
@@ -111,22 +112,27 @@ def delayed(x: Array, samples: float) -> Array:
 
 
 @njit(cache=False, nogil=True)
-def _table(i: Array, sector: NDArray[np.int64], sign: Array) -> Array:
-    """Mean of each phase's current in each sector, plain and times the sign of the current: (n, 2, 3, SECTORS)."""
+def _table(i: Array, sector: Array, sign: Array) -> Array:
+    """Mean of each phase's current in each sector, plain and times the sign of the current: (n, 2, 3, SECTORS).
+
+    Sectors overlap as triangles, and a mean fades where hardly a sample is: else it would jump with the slightest load
+    that takes the rotor into one sector more.
+    """
     n, _, n_times = i.shape
     total = np.zeros((n, 2, 3, SECTORS))
     for run in range(n):
         for j in range(3):
             count = np.zeros(SECTORS)
             for t in range(n_times):
-                s = sector[run, j, t]
-                count[s] += 1.0
-                total[run, 0, j, s] += i[run, j, t]
-                total[run, 1, j, s] += i[run, j, t] * sign[run, t]
+                whole = int(sector[run, j, t])
+                share = sector[run, j, t] - whole
+                for s, weight in ((whole % SECTORS, 1.0 - share), ((whole + 1) % SECTORS, share)):
+                    count[s] += weight
+                    total[run, 0, j, s] += weight * i[run, j, t]
+                    total[run, 1, j, s] += weight * i[run, j, t] * sign[run, t]
             for s in range(SECTORS):
-                if count[s] > 0.0:
-                    total[run, 0, j, s] /= count[s]
-                    total[run, 1, j, s] /= count[s]
+                total[run, 0, j, s] /= count[s] + FEW
+                total[run, 1, j, s] /= count[s] + FEW
     return total
 
 
@@ -153,7 +159,7 @@ def features(plant: Actuator, signals: Signals) -> dict[str, Array]:
     I_ref = np.clip(c.K_w * (c.K_p * (signals.theta_cmd - signals.theta_u) - w_m), -limit, limit)
     lag = 2.0 / (2.0 * np.pi * plant.sensors.f_lag) * rate + 0.5
     smooth = np.apply_along_axis(np.convolve, -1, i_q, np.ones(21) / 21.0, "same")
-    sector = np.floor((theta_e / (2.0 * np.pi)) % 1.0 * SECTORS).astype(np.int64) % SECTORS
+    sector = (theta_e / (2.0 * np.pi)) % 1.0 * SECTORS
     sign = smooth / (np.abs(smooth) + I_SIGN)
     skip = round(SETTLING * rate)
     table = _table(signals.i[:, :, skip:], sector[:, :, skip:], sign[:, skip:])

@@ -43,6 +43,7 @@ N_REFINED_AT_LEAST = 2
 NO_WORSE = 1.5  # times the squared residual of the best start, from which a start with fewer faults is not preferred
 ONE_CAUSE = 0.25  # relative spread up to which several parameters are one cause
 K_SEEN = 0.01  # a fault that is there
+COLLINEAR = 0.9  # cosine from which two effects look like each other
 FAR = 100.0  # excess from which candidates are simulated before they are ranked
 NEAR_NOISE = 0.05  # excess below which a fit need not go on
 MAX_EFFECTS = 3
@@ -197,6 +198,10 @@ class Search:
             if s.candidate.effect not in {**refined, **others}:
                 others[s.candidate.effect] = self._refined(model, s)
         refined |= others
+        best = min(refined.values(), key=lambda m: m.heldout)
+        for s in screened:
+            if s.candidate.effect not in refined and self._looks_like(model, best, s.candidate):
+                refined[s.candidate.effect] = self._refined(model, s)
         for name, m in self._close(refined):  # a rival is out only if it leaves more when fitted as well as the best
             again = self.model(m.effects, m.fit.free, m.fit.point, None, 4)
             refined[name] = min(m, again, key=lambda x: x.heldout)
@@ -225,6 +230,19 @@ class Search:
             if np.ptp(values) <= ONE_CAUSE * abs(values.mean()):
                 found.append(made)
         return sorted(found, key=lambda m: m.heldout)
+
+    def _looks_like(self, model: Model, best: Model, c: Candidate) -> bool:
+        """Whether what the last effect of `best` does is, beside what is free in `model`, also within reach of `c`."""
+        effect = best.effects[-1]
+        names = [f"{effect.effect}.{name}" for name in effect.linear]
+        values = np.array([best.fit.point[name] - self.plant.neutral(name) for name in names])
+        own, _ = np.linalg.qr(stacked_jacobian(self.noise, model.fit.free, model.fit.columns, self.train))
+        frees = [f for f in best.fit.free if f.name in names]
+        done = stacked_jacobian(self.noise, frees, best.fit.columns, self.train) @ values
+        reach = self._columns(c)
+        done, reach = done - own @ (own.T @ done), reach - own @ (own.T @ reach)
+        Q, _ = np.linalg.qr(reach)
+        return float(np.linalg.norm(Q.T @ done)) > COLLINEAR * float(np.linalg.norm(done))
 
     def _simulated(self, model: Model, screened: Sequence[Screened]) -> list[Screened]:
         """Candidates by what their starts leave when simulated: far from the data first order promises little."""
