@@ -19,6 +19,7 @@ import numpy as np
 from scipy.stats import beta
 
 from ema.core import config, resources
+from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
 from ema.core.version import version
 from ema.discrepancy.actuator.cycles import measured
@@ -38,16 +39,21 @@ def trial(name: str, seed: int, n_cycles: int, *, varied: bool = True, n_threads
     record = Record(tuple(Cycle(n, c) for n, c in enumerate(hidden.cycles(flaws, n_cycles, seed, motions, bench))))
     plant = config.load(resources.config("actuator.yaml"), Actuator)
     begun = time.process_time()
-    findings = examine(plant, measured(plant, [record]), n_threads=n_threads).findings.as_dict()
+    told = {"case": name, "seed": seed, "version": VERSION, "hidden": values, "k": k}
+    try:
+        data = measured(plant, [record])
+    except RecordError as error:
+        return {**told, "outcome": "refused", "said": [str(error)]}
+    findings = examine(plant, data, n_threads=n_threads).findings.as_dict()
     found = {f"{e['name']}.{p}": q for e in findings["effects"] for p, q in e["parameters"].items()}
     true = {p: truth(values) for p, truth in cases.CASES[name].parameters.items() if p in found}
     sd = {p: (found[p]["high"] - found[p]["low"]) / 3.92 for p in true}
     gain = findings["gain"]
     outcome = cases.outcome(name, findings)
     return {
-        "case": name, "seed": seed, "outcome": outcome, "verdict": findings["verdict"], "version": VERSION,
+        **told, "outcome": outcome, "verdict": findings["verdict"],
         "visible": cases.visibility(hidden, flaws, n_cycles, seed, motions, bench) if outcome == "missed" else None,
-        "named": [[e["name"], *e["indistinguishable_from"]] for e in findings["effects"]], "hidden": values, "k": k,
+        "named": [[e["name"], *e["indistinguishable_from"]] for e in findings["effects"]],
         "confidence": [e["confidence"] for e in findings["effects"]],
         "parameter_errors": {p: found[p]["value"] / x - 1.0 for p, x in true.items()},
         "z": {p: (found[p]["value"] - x) / sd[p] for p, x in true.items() if sd[p] > 0.0},
@@ -78,6 +84,7 @@ def table(rows: list[dict[str, Any]]) -> str:
     """The results by case."""
     head = f"{'hidden':30s} {'n':>3} {'right':>5} {'set':>4} {'wrong':>5} {'missed':>6} {'unseen':>6} {'param.':>7}"
     lines = [head + "  err_i before after floor [mA]  err_k before after"]
+    refused, rows = ([row for row in rows if (row["outcome"] == "refused") is yes] for yes in (True, False))
     for name in dict.fromkeys(row["case"] for row in rows):
         these = [row for row in rows if row["case"] == name]
         count = {o: sum(_told(row) == o for row in these) for o in ("right", "in set", "wrong", "missed", "unseen")}
@@ -107,6 +114,7 @@ def table(rows: list[dict[str, Any]]) -> str:
         lines.append(
             f"false alarms without an effect: {_rate(sum(row['verdict'] != 'adequate' for row in alarms), len(alarms))}"
         )
+    lines += [f"refused: {row['case']} {row['seed']}: {row['said'][0]}" for row in refused]
     return "\n".join(lines)
 
 
@@ -130,7 +138,7 @@ def main(seeds: int, first: int, only: tuple[str, ...], cycles: int, varied: boo
                 rows.append(row)
                 with out.open("a") as file:
                     file.write(json.dumps(row) + "\n")
-                click.echo(f"{name} {seed}: {row['outcome']} {row['verdict']} {row['named']}", err=True)
+                click.echo(f"{name} {seed}: {row['outcome']} {row.get('verdict')} {row.get('named')}", err=True)
     click.echo(table([row for row in rows if not only or row["case"] in only]))
 
 
