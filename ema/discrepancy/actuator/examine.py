@@ -25,6 +25,7 @@ from .select import FINAL_SEED, MAX_EFFECTS, N_FINAL, Model, Search, start_model
 from .structure import structure
 
 MIN_CYCLES = 2
+IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
 WORTH_IT = 0.25  # share of what is left that a further effect must take on held-out cycles
 ENOUGH = 0.05  # share of what faults alone leave, from which effects explain it but for the form of their laws
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
@@ -299,7 +300,7 @@ def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...], to
     for p in e.parameters:
         name = f"{effect}.{p.name}"
         if name in bounds:
-            sd, f = interval(fit, name), bounds[name]
+            sd, f = np.hypot(interval(fit, name), IMPLEMENTATION * values[p.name]), bounds[name]
             parameters[p.name] = Quantity(
                 values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
             )
