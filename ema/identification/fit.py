@@ -8,6 +8,7 @@ import numpy as np
 
 from ema.core.status import Reason, Status
 
+from .alike import CAUSE, common_shorts
 from .estimate import Estimate
 from .measurement import Measurement
 from .noise import NoiseModel
@@ -82,6 +83,8 @@ def concluded(
     full = np.full(len(measurement.i_hat), np.nan)
     full[measurement.valid] = residual
     open_directions = unseparable(covariance)
+    if CAUSE not in nuisance.names:
+        open_directions += common_shorts(answer, covariance)
     nuisance_estimate, edges = None, None
     if len(nuisance):
         A, b = problem.whitened(white, nuisance)

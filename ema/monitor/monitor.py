@@ -11,6 +11,7 @@ from ema.bundle import Bundle
 from ema.bus.codec import Codec
 from ema.bus.protection import Counts
 from ema.core.errors import ConfigError
+from ema.core.names import FAULTS
 from ema.core.status import Reason, Status
 from ema.identification import METHODS, Estimate, identifier
 
@@ -34,6 +35,7 @@ class _Channel:
         self.noise = bundle.noise(FIRST)
         self.identifier = identifier(FIRST, bundle)
         self.doubts = {method: ModelDoubt(settings.model_check) for method in (FIRST, *settings.slower)}
+        self.unseparable = dict.fromkeys(self.doubts, 0)  # estimates until it is told again
         self.chosen = dict.fromkeys(settings.slower, -1)  # interval of the last cycle chosen
 
 
@@ -115,6 +117,18 @@ class Monitor:
         yield Identified(job.t_ns, job.actuator, job.cycle, replace(estimate, status=status, reasons=reasons))
         if changed:
             yield _judgement(job, doubt, job.method == FIRST and ARBITER in self._settings.slower)
+        if self._is_newly_unseparable(job, estimate):
+            yield _unseparable(job, estimate)
+
+    def _is_newly_unseparable(self, job: Job, estimate: Estimate) -> bool:
+        """Whether faults cannot be told apart that could in all of the last cycles."""
+        quiet = self._channels[job.actuator].unseparable
+        before = quiet[job.method]
+        if estimate.reasons & Reason.UNSEPARABLE:
+            quiet[job.method] = self._settings.model_check.cycles
+            return before == 0
+        quiet[job.method] = max(before - 1, 0)
+        return False
 
     def _reasons(self, job: Job, estimate: Estimate) -> Reason:
         """Reasons of estimate and cycle, with what the model check makes of them.
@@ -153,6 +167,16 @@ def _sampled(channel: _Channel, job: Job, estimate: Estimate) -> SampledEnvelope
     else:
         sd = np.sqrt(np.diag(channel.noise.covariance(job.measurement.start, estimate.k)))
     return SampledEnvelope(job.t_ns, job.actuator, job.cycle, channel.t, measured, measured - estimate.residual, sd)
+
+
+def _unseparable(job: Job, estimate: Estimate) -> Event:
+    names = " or ".join(
+        " with ".join(fault for fault, share in zip(FAULTS, direction, strict=True) if abs(share) > 0.3)
+        for direction in estimate.unseparable
+    )
+    text = f"{job.method}: cycle {job.cycle} does not tell {names} from each other or from another cause"
+    text += f"; to tell: ema discrepancy LOG --plant FILE --cycles {job.cycle},…"
+    return Event(job.t_ns, Level.WARNING, "unseparable", text, job.actuator)
 
 
 def _judgement(job: Job, doubt: ModelDoubt, arbitrated: bool) -> Event:

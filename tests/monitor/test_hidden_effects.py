@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from hidden_traffic import watched
 
+from ema.core.status import Reason, Status
 from ema.monitor import Level
 
 N = 6  # cycles
@@ -34,8 +35,17 @@ def test_neither_a_sound_actuator_nor_a_faulty_one_is_doubted(hidden, coarse_bun
     assert not seen.alarms([faults.get(f"k{j}", 0.0) for j in range(1, 7)])
 
 
-def test_a_weaker_magnet_is_three_false_alarms_that_no_residual_tells(hidden, coarse_bundle):
+def test_a_weaker_magnet_reads_as_three_shorts_that_are_marked_unseparable(hidden, coarse_bundle):
     """Its response and that of three equal shorts differ by less than a model is trusted (docs/nuisance.md)."""
     seen = flown(hidden, coarse_bundle, flux=-0.066)
     assert seen.alarms([0.0] * 6) == ["k3", "k4", "k5"]
     assert seen.doubted.sum() <= 1
+    assert all(e.status is Status.DEGRADED and e.reasons & Reason.UNSEPARABLE for e in seen.estimates)
+    event, *_ = [e for e in seen.events if e.code == "unseparable"]
+    assert "k3 with k4 with k5" in event.text
+
+
+def test_shorts_that_are_not_alike_are_told_apart(hidden, coarse_bundle):
+    seen = flown(hidden, coarse_bundle, k3=0.06, k5=0.03)
+    assert not any(e.reasons & Reason.UNSEPARABLE for e in seen.estimates)
+    assert not any(e.code == "unseparable" for e in seen.events)

@@ -300,7 +300,7 @@ def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...], to
     for p in e.parameters:
         name = f"{effect}.{p.name}"
         if name in bounds:
-            sd, f = np.hypot(interval(fit, name), IMPLEMENTATION * values[p.name]), bounds[name]
+            sd, f = float(np.hypot(interval(fit, name), IMPLEMENTATION * values[p.name])), bounds[name]
             parameters[p.name] = Quantity(
                 values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
             )
