@@ -95,6 +95,7 @@ def examine(
             after, v = _grown(search, before, other, w, alike, conditions)
     after, v = _simpler(search, after, v, alike)
     after, v = _without_superfluous(search, after, v, alike)
+    alike = [_still_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
     findings = _findings(search, before, after, v, alike)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
         findings, after = _with_function(search, findings, before, after)
@@ -195,6 +196,29 @@ def _without_superfluous(
                 model, v = reduced, search.verdict(reduced)
                 search.say(f"{effect.effect} is superfluous: p = {v.p_value:.2g}")
     return model, v
+
+
+def _still_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...]) -> tuple[str, ...]:
+    """The rivals of one effect that do as well beside the effects that were found after it."""
+    if place == len(model.effects) - 1:
+        return rivals
+    mine = model.effects[place]
+    others = tuple(c for c in model.effects if c != mine)
+    kept = []
+    for rival in rivals:
+        beside = [m for m in search.tried if m.names and m.names[-1] == rival]
+        if rival in model.names:
+            continue
+        if beside:
+            c, own = beside[-1].effects[-1], {f.name for f in mine.frees}
+            values = {name: x for name, x in beside[-1].fit.point.items() if name.startswith(f"{rival}.")}
+            start = {name: x for name, x in model.fit.point.items() if not name.startswith(f"{mine.effect}.")} | values
+            frees = (*(f for f in model.fit.free if f.name not in own), *c.frees)
+            m = search.model((*others, c), frees, start, None, 4)
+            if m.heldout - model.heldout > ALIKE * model.excess + CHANCE:
+                continue
+        kept.append(rival)
+    return tuple(kept)
 
 
 def _is_credible(model: Model) -> bool:
