@@ -37,10 +37,13 @@ def write_extended(
             **declared.get(key, {}),
             **{name: float(f"{q.value:.6g}") for name, q in effect.parameters.items()},
         }
-        intervals[key] = {
-            **intervals.get(key, {}),
-            **{name: [float(f"{x:.4g}") for x in (q.low, q.high)] for name, q in effect.parameters.items()},
+        known = {
+            name: [float(f"{x:.6g}") for x in (q.low, q.high)]
+            for name, q in effect.parameters.items()
+            if q.low < q.high
         }
+        if known:
+            intervals[key] = {**intervals.get(key, {}), **known}
         comments.append(f"# {effect.sentence}")
         if effect.indistinguishable_from:
             comments.append(f"#   or {', '.join(effect.indistinguishable_from)}; told apart by {effect.separated_by}")

@@ -10,7 +10,7 @@ from numba import njit
 from .base import Parameter
 
 KNOTS = tuple(f"torque_{n}" for n in range(10))  # at even distances, the first at `low` and the last at `high`
-LIMIT = 0.1  # [N m], as for torque lines
+LIMIT = 0.3  # [N m], a fifth of what the motor can
 
 
 @njit(inline="always")

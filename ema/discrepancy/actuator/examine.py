@@ -245,8 +245,10 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
     )
     notes: list[str] = []
     shape: dict[str, Any] = {}
+    share = 1.0 - after.excess / max(before.excess, 1e-9)
+    too_little = verdict == "unexplained" and share < NAMED
     if verdict == "unexplained" or (after.effects and not v.is_noise):
-        base = Model((), before.fit, before.heldout) if odd else after
+        base = Model((), before.fit, before.heldout) if odd or too_little else after  # beside what is named
         shape = structure(search.torques(base), search.plant.plant.control.rate, v.scores)
     if verdict == "explained" and not v.is_noise:
         notes.append("a small rest above noise is left: the true law has another form than the library's")
@@ -254,8 +256,7 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
     kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c not in odd]
     found = [_found(search, after, c.effect, a) for c, a in kept]
-    share = 1.0 - after.excess / max(before.excess, 1e-9)
-    if verdict == "unexplained" and found and share < NAMED:
+    if too_little and found:
         notes.append(
             f"{', '.join(e.name for e in found)} would explain {share:.0%} of the rest: too little to be named"
         )
