@@ -48,9 +48,8 @@ def to_unit(value: str, unit: str) -> float:
     try:
         number, name = _parted(value)
         quantity = _registry().Quantity(float(number), name)
-        converted = float(
-            f"{quantity.to(unit or 'dimensionless').magnitude:.15g}"
-        )  # 0.36 mH: 0.00036 H, not a bit less
+        # 0.36 mH is 0.00036 H, not a bit less
+        converted = float(f"{quantity.to(unit or 'dimensionless').magnitude:.15g}")
     except pint.DimensionalityError as error:
         raise ValueError(f"{value!r} has the wrong unit, expected [{unit or '1'}]") from error
     except (pint.PintError, *_PARSER) as error:

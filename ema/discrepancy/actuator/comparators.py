@@ -26,13 +26,17 @@ def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]
         return max(noise.misfit(list(left.values()), cycles) - 1.0, 0.0)
 
     now = excess(None)
-    T = 1.0 / plant.plant.control.rate
-    left, best = min((excess((step,)), step) for step in (T / round(T / about) for about in STEPS))
+    left, best = min((excess((step,)), step) for step in (_dividing(plant, about) for about in STEPS))
     return best if left < CLEAR * now else None
 
 
 def take_step(plant: EmaPlant, step: float) -> None:
     """Simulate with this step from now on, and with its neighbours where noise is asked for."""
-    T = 1.0 / plant.plant.control.rate
     plant.steps = (step,)
-    plant.noise_steps = tuple(T / round(T / (step * factor)) for factor in AROUND)
+    plant.noise_steps = tuple(_dividing(plant, step * factor) for factor in AROUND)
+
+
+def _dividing(plant: EmaPlant, about: float) -> float:
+    """The step nearest to `about` of which a whole number makes a control period. [s]"""
+    T = 1.0 / plant.plant.control.rate
+    return T / round(T / about)

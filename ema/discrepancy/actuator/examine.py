@@ -202,22 +202,12 @@ def _still_alike(search: Search, model: Model, place: int, rivals: tuple[str, ..
     """The rivals of one effect that do as well beside the effects that were found after it."""
     if place == len(model.effects) - 1:
         return rivals
-    mine = model.effects[place]
-    others = tuple(c for c in model.effects if c != mine)
     kept = []
-    for rival in rivals:
+    for rival in (r for r in rivals if r not in model.names):
         beside = [m for m in search.tried if m.names and m.names[-1] == rival]
-        if rival in model.names:
-            continue
-        if beside:
-            c, own = beside[-1].effects[-1], {f.name for f in mine.frees}
-            values = {name: x for name, x in beside[-1].fit.point.items() if name.startswith(f"{rival}.")}
-            start = {name: x for name, x in model.fit.point.items() if not name.startswith(f"{mine.effect}.")} | values
-            frees = (*(f for f in model.fit.free if f.name not in own), *c.frees)
-            m = search.model((*others, c), frees, start, None, 4)
-            if m.heldout - model.heldout > ALIKE * model.excess + CHANCE:
-                continue
-        kept.append(rival)
+        m = search.instead(model, model.effects[place], beside[-1]) if beside else model
+        if m.heldout - model.heldout <= ALIKE * model.excess + CHANCE:
+            kept.append(rival)
     return tuple(kept)
 
 

@@ -171,10 +171,15 @@ class Search:
 
     def without(self, model: Model, effect: Candidate) -> Model:
         """The model fitted anew without one of its effects."""
-        own = {f.name for f in effect.frees}
-        point = {name: value for name, value in model.fit.point.items() if not name.startswith(f"{effect.effect}.")}
-        frees = tuple(f for f in model.fit.free if f.name not in own)
-        return self.model(tuple(c for c in model.effects if c != effect), frees, point, model.fit.columns, 3)
+        effects, frees, point = _stripped(model, effect)
+        return self.model(effects, frees, point, model.fit.columns, 3)
+
+    def instead(self, model: Model, effect: Candidate, rival: Model) -> Model:
+        """The model fitted anew with the last effect of `rival` in the place of one of its own."""
+        effects, frees, point = _stripped(model, effect)
+        c = rival.effects[-1]
+        start = {name: x for name, x in rival.fit.point.items() if name.startswith(f"{c.effect}.")}
+        return self.model((*effects, c), (*frees, *c.frees), {**point, **start}, None, 4)
 
     def extend(self, model: Model) -> list[Model]:
         """The best models with one more effect, best first."""
@@ -199,8 +204,8 @@ class Search:
                 others[s.candidate.effect] = self._refined(model, s)
         refined |= others
         best = min(refined.values(), key=lambda m: m.heldout)
-        for s in screened:
-            if s.candidate.effect not in refined and self._looks_like(model, best, s.candidate):
+        for s in self._looking_like(model, best, [s for s in screened if s.candidate.effect not in refined]):
+            if s.candidate.effect not in refined:
                 refined[s.candidate.effect] = self._refined(model, s)
         for name, m in self._close(refined):  # a rival is out only if it leaves more when fitted as well as the best
             again = self.model(m.effects, m.fit.free, m.fit.point, None, 4)
@@ -231,18 +236,22 @@ class Search:
                 found.append(made)
         return sorted(found, key=lambda m: m.heldout)
 
-    def _looks_like(self, model: Model, best: Model, c: Candidate) -> bool:
-        """Whether what the last effect of `best` does is, beside what is free in `model`, also within reach of `c`."""
+    def _looking_like(self, model: Model, best: Model, screened: Sequence[Screened]) -> list[Screened]:
+        """Those that can do, beside what is free in `model`, nearly all that the last effect of `best` does."""
         effect = best.effects[-1]
         names = [f"{effect.effect}.{name}" for name in effect.linear]
         values = np.array([best.fit.point[name] - self.plant.neutral(name) for name in names])
         own, _ = np.linalg.qr(stacked_jacobian(self.noise, model.fit.free, model.fit.columns, self.train))
         frees = [f for f in best.fit.free if f.name in names]
         done = stacked_jacobian(self.noise, frees, best.fit.columns, self.train) @ values
-        reach = self._columns(c)
-        done, reach = done - own @ (own.T @ done), reach - own @ (own.T @ reach)
-        Q, _ = np.linalg.qr(reach)
-        return float(np.linalg.norm(Q.T @ done)) > COLLINEAR * float(np.linalg.norm(done))
+        done -= own @ (own.T @ done)
+
+        def reaches(s: Screened) -> bool:
+            reach = self._columns(s.candidate)
+            Q, _ = np.linalg.qr(reach - own @ (own.T @ reach))
+            return float(np.linalg.norm(Q.T @ done)) > COLLINEAR * float(np.linalg.norm(done))
+
+        return [s for s in screened if reaches(s)]
 
     def _simulated(self, model: Model, screened: Sequence[Screened]) -> list[Screened]:
         """Candidates by what their starts leave when simulated: far from the data first order promises little."""
@@ -292,6 +301,14 @@ class Search:
             return sum(float(r @ r) for r in left.values())
 
         return min(((point, cost(point)) for point in starts), key=lambda entry: entry[1])
+
+
+def _stripped(model: Model, effect: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:
+    """Effects, free parameters and point of a model without one of its effects."""
+    own = {f.name for f in effect.frees}
+    point = {name: x for name, x in model.fit.point.items() if not name.startswith(f"{effect.effect}.")}
+    effects = tuple(c for c in model.effects if c != effect)
+    return effects, tuple(f for f in model.fit.free if f.name not in own), point
 
 
 class Screened(NamedTuple):
