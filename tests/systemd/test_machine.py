@@ -74,11 +74,12 @@ def segments(folder):
 
 
 def estimates(folder):
-    """Linear estimates in a log, in order: (cycle, k as the bus carries them)."""
+    """Linear estimates in a log, in order: (cycle, k as the bus carries them: 0 where a cycle was refused)."""
     scale = default().messages["EstimateLinear"].fields["k"].scale
     with LogReader(folder) as log:
-        found = log.messages(lambda topic: topic == "/estimate/0/linear")
-        return [(m.content["cycle"], tuple(np.round(np.array(m.content["k"]) / scale).astype(int))) for m in found]
+        found = [m.content for m in log.messages(lambda topic: topic == "/estimate/0/linear")]
+    k = np.nan_to_num(np.array([content["k"] for content in found], dtype=float).reshape(-1, 6))
+    return [(one["cycle"], tuple(row)) for one, row in zip(found, np.round(k / scale).astype(int), strict=True)]
 
 
 def test_network_and_receive_buffer_are_as_the_installed_files_say(facts):
