@@ -13,26 +13,27 @@ from ema.core.names import FAULTS
 
 SHORTS = np.array([name in ("k3", "k4", "k5") for name in FAULTS])
 CAUSE = "magnet_flux.change"
-SEEN = 0.02  # mean of the three from which it is told
-SPREAD = 0.25  # of the three, relative to their mean, up to which they are alike in any case
+SEEN = 0.02  # mean of the two least from which it is told
+SPREAD = 0.25  # of the two least, relative to their mean, up to which they are alike in any case
 N_SIGMA = 3.0
-DIFFERENCES = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0]])
-CHI2 = float(chdtri(len(DIFFERENCES), 0.01))  # of the differences, up to which they are what noise makes of none
+CHI2 = float(chdtri(1, 0.05))  # of their difference, up to which it is what noise makes of none
 
 
 def common_shorts(k: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The common direction (6,) of three shorts that are seen and alike; empty otherwise.
+    """The common direction (6,) of three shorts that are seen, the two least alike; empty otherwise.
+
+    The third may have grown beside a weaker magnet.
 
     Parameters
     ----------
     k : array, shape (6,)
     covariance : array, shape (6, 6)
     """
-    e = SHORTS / SHORTS.sum()
-    mean, sd = float(e @ k), float(np.sqrt(max(e @ covariance @ e, 0.0)))
+    least = np.flatnonzero(SHORTS)[np.argsort(k[SHORTS])[:2]]
+    C = covariance[np.ix_(least, least)]
+    mean, sd = float(k[least].mean()), float(np.sqrt(max(C.sum(), 0.0))) / 2.0
     if mean < max(SEEN, N_SIGMA * sd):
         return ()
-    difference = DIFFERENCES @ k[SHORTS]
-    C = DIFFERENCES @ covariance[np.ix_(SHORTS, SHORTS)] @ DIFFERENCES.T
-    as_noise = float(difference @ np.linalg.pinv(C) @ difference) < CHI2
-    return (SHORTS / np.linalg.norm(SHORTS),) if as_noise or np.ptp(k[SHORTS]) < SPREAD * mean else ()
+    difference, variance = float(np.diff(k[least])[0]), float(C[0, 0] + C[1, 1] - 2.0 * C[0, 1])
+    alike = difference < SPREAD * mean or difference**2 < CHI2 * variance
+    return (SHORTS / np.linalg.norm(SHORTS),) if alike else ()

@@ -45,7 +45,14 @@ def test_a_weaker_magnet_reads_as_three_shorts_that_are_marked_unseparable(hidde
     assert "k3 with k4 with k5" in event.text
 
 
-def test_shorts_that_are_not_alike_are_told_apart(hidden, coarse_bundle):
-    seen = flown(hidden, coarse_bundle, k3=0.06, k5=0.03)
+def test_a_short_beside_a_weaker_magnet_is_marked_too(hidden, coarse_bundle):
+    """Two of the three have not grown at all; what they read alike is the magnet's."""
+    seen = flown(hidden, coarse_bundle, flux=-0.066, k4=0.06)
+    assert all(e.status is Status.DEGRADED and e.reasons & Reason.UNSEPARABLE for e in seen.estimates)
+
+
+@pytest.mark.parametrize("shorts", [{"k3": 0.06, "k5": 0.03}, {"k3": 0.02, "k4": 0.1, "k5": 0.14}], ids=str)
+def test_shorts_that_are_not_alike_are_told_apart(hidden, coarse_bundle, shorts):
+    seen = flown(hidden, coarse_bundle, **shorts)
     assert not any(e.reasons & Reason.UNSEPARABLE for e in seen.estimates)
     assert not any(e.code == "unseparable" for e in seen.events)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -162,9 +162,9 @@ class Search:
         names = [Free(f"{c.key}/{j}", 0.0, 0.0, 1.0) for j in range(len(c.amounts))]
         return stacked_jacobian(self.noise, names, self.columns, self.train)
 
-    def start_without(self, model: Model, c: Candidate, faults: Sequence[str]) -> Point:
-        """A start that takes some faults out of `model` and lets the effect alone stand for them."""
-        point = {**model.fit.point, **dict.fromkeys(faults, 0.0)}
+    def start_with(self, model: Model, c: Candidate, faults: Point) -> Point:
+        """A start with some faults of `model` at other values, where the effect stands for what that takes away."""
+        point = {**model.fit.point, **faults}
         left = residuals(self.plant, self.noise, point, self.train, N_GLANCE)
         step, _ = bounded(self._columns(c), np.concatenate([left[cycle] for cycle in self.train]), *c.limits())
         return {**point, **c.start(step)}
@@ -227,8 +227,7 @@ class Search:
                 continue
             self.probe([c])
             rest = {name: 0.0 if name in gone else k[name] - common for name in faults}
-            less = Model(model.effects, replace(model.fit, point={**k, **rest}), model.heldout)
-            start = self.start_without(less, c, gone)
+            start = self.start_with(model, c, rest)
             frees = tuple(f for f in model.fit.free if f.name not in gone)
             made = self.model((*model.effects, c), (*frees, *c.frees), start, None, 10)
             values = np.array([made.fit.point[f"{c.effect}.{name}"] for name in c.linear])
@@ -260,7 +259,8 @@ class Search:
         share = len(self.train) / len(cycles)
         ranked = []
         for s in screened:
-            start, cost = self._better([s.start, self.start_without(model, s.candidate, FAULTS)], cycles)
+            alone = self.start_with(model, s.candidate, dict.fromkeys(FAULTS, 0.0))
+            start, cost = self._better([s.start, alone], cycles)
             ranked.append(Screened(share * cost, s.candidate, start))
         return sorted(ranked, key=lambda entry: entry.promised)
 
@@ -273,12 +273,15 @@ class Search:
 
     def _refined(self, model: Model, s: Screened) -> Model:
         frees = (*model.fit.free, *s.candidate.frees)
-        starts = [s.start, self.start_without(model, s.candidate, FAULTS)]
-        start, cost = self._better(starts)
+        start, cost = self._better([s.start, self.start_with(model, s.candidate, dict.fromkeys(FAULTS, 0.0))])
         if self._stands_for_faults(model, s.candidate):
-            # One effect for several faults is the simpler cause; noise in the columns would leave the faults there.
+            # One effect for several faults, or for what they have in common, is the simpler cause; noise in the
+            # columns would leave the faults there.
             faults = [name for name in registry()[s.candidate.effect].mistaken_for if name in FAULTS]
-            simpler, simpler_cost = self._better([self.start_without(model, s.candidate, faults)])
+            k = model.fit.point
+            common = min(k[name] for name in faults)
+            less = (dict.fromkeys(faults, 0.0), {name: k[name] - common for name in faults})
+            simpler, simpler_cost = self._better([self.start_with(model, s.candidate, rest) for rest in less])
             if simpler_cost < NO_WORSE * cost:
                 start = simpler
         return self.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3)
