@@ -116,9 +116,13 @@ class Monitor:
         status = max(estimate.status, Status.DEGRADED if reasons & _DEGRADING else Status.VALID)
         yield Identified(job.t_ns, job.actuator, job.cycle, replace(estimate, status=status, reasons=reasons))
         if changed:
-            yield _judgement(job, doubt, job.method == FIRST and ARBITER in self._settings.slower)
-        if self._is_newly_unseparable(job, estimate):
+            yield _judgement(job, doubt, not self._has_last_word(job.method))
+        if self._has_last_word(job.method) and self._is_newly_unseparable(job, estimate):
             yield _unseparable(job, estimate)
+
+    def _has_last_word(self, method: str) -> bool:
+        """Whether no other method will tell apart what this one cannot."""
+        return method != FIRST or ARBITER not in self._settings.slower
 
     def _is_newly_unseparable(self, job: Job, estimate: Estimate) -> bool:
         """Whether faults cannot be told apart that could in all of the last cycles."""
