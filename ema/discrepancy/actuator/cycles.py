@@ -26,6 +26,8 @@ START_SAMPLES = 10
 HIDDEN = 2e-5  # [rad rms] noise of the rotor angle that its own motion hides
 MEDIAN_OF_NORMAL = 0.6745  # of |x| where x is standard normal
 AT_REST = 1e-3  # [s] at the start of a cycle, over which the position is averaged
+CLEAR = 4.0  # standard deviations
+STARTING = 10e-3  # [s] at the start of a cycle, over which the user's motion is a parabola
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,8 @@ class Measured:
         θ_u and θ_m at the start. [rad]
     speed : array, shape (n_cycles,)
         ω_m at the start: a record may be cut out of a longer motion. [rad/s]
+    user_speed : array, shape (n_cycles,)
+        ω_u at the start: behind play or a soft gear the user may still swing when the rotor rests. [rad/s]
     holding : array, shape (n_cycles, 3)
         Phase currents at the start, their mean taken off. [A]
     dT : array, shape (n_cycles,)
@@ -68,6 +72,7 @@ class Measured:
     envelopes: list[Array]
     start: Array
     speed: Array
+    user_speed: Array
     holding: Array
     dT: Array
     has_temperature: bool
@@ -109,6 +114,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
     start = np.array([[s.theta_u[0, :rest].mean(), s.theta_m[0, 0]] for s in signals])
     holding = np.array([s.i[0, :, :rest].mean(axis=1) for s in signals])
     speed = np.array([_speed_at_start(s.theta_m[0], plant.control.rate) for s in signals])
+    user_speed = np.array([_user_speed_at_start(s.theta_u[0], plant.control.rate) for s in signals])
     dT = np.array([cycle["temp_w"].mean() - T_20 if with_temperature else 0.0 for _, cycle in everything])
     return Measured(
         tuple(labels),
@@ -119,6 +125,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
         [envelope(s.i, plant.control.rate)[0] for s in signals],
         start,
         speed,
+        user_speed,
         holding - holding.mean(axis=1, keepdims=True),
         dT,
         with_temperature,
@@ -159,6 +166,13 @@ def _speed_at_start(theta_m: Array, rate: float) -> float:
     w = (3.0 * first - second) * rate / (2.0 * m)
     moving = first * second > 0.0 and abs(first) > 0.5 * abs(second)
     return w if moving and abs(w) > max(AT_REST_SPEED, 3.0 * step * rate / m) else 0.0
+
+
+def _user_speed_at_start(theta_u: Array, rate: float) -> float:
+    """ω_u at the first sample by a parabola through the first ones; zero where that is not clear of its noise."""
+    t = np.arange(round(STARTING * rate)) / rate
+    (_, w, _), covariance = np.polyfit(t, theta_u[: len(t)], 2, cov=True)
+    return float(w) if w**2 > CLEAR**2 * covariance[1, 1] else 0.0
 
 
 def _step(x: Array) -> float:

@@ -95,6 +95,7 @@ def examine(
             after, v = _grown(search, before, other, w, alike, conditions)
     after, v = _simpler(search, after, v, alike)
     after, v = _without_superfluous(search, after, v, alike)
+    after, v = _settled(search, after, v)
     alike = [_still_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
     findings = _findings(search, before, after, v, alike)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
@@ -198,6 +199,14 @@ def _without_superfluous(
     return model, v
 
 
+def _settled(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
+    """`model` with faults and effects told apart that look nearly the same, as far as the record allows."""
+    if not model.effects:
+        return model, v
+    found = search.settled(model)
+    return (model, v) if found.heldout > model.heldout + CHANCE else (found, search.verdict(found))
+
+
 def _still_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...]) -> tuple[str, ...]:
     """The rivals of one effect that do as well beside the effects that were found after it."""
     if place == len(model.effects) - 1:
@@ -291,18 +300,8 @@ def _with_function(search: Search, findings: Findings, before: Model, after: Mod
 
 def _integer(fit: Fit) -> bool:
     order = fit.point["cogging.order"]
-    sd = interval(fit, "cogging.order")
+    sd = fit.sd["cogging.order"]
     return abs(order - round(order)) < max(NON_INTEGER, 3.0 * sd)
-
-
-def interval(fit: Fit, name: str) -> float:
-    """Standard deviation of a parameter, as much larger as the fit is worse than noise.
-
-    Cycles of one motion share what the integration step makes of them: they count as one.
-    """
-    j = [f.name for f in fit.free].index(name)
-    repeated = len(fit.residuals) / len({motion for motion, _ in fit.columns})
-    return float(np.sqrt(fit.covariance[j, j] * repeated * max(fit.misfit, 1.0)))
 
 
 def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...], told_as: str = "") -> FoundEffect:
@@ -315,7 +314,7 @@ def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...], to
     for p in e.parameters:
         name = f"{effect}.{p.name}"
         if name in bounds:
-            sd, f = float(np.hypot(interval(fit, name), IMPLEMENTATION * values[p.name])), bounds[name]
+            sd, f = float(np.hypot(fit.sd[name], IMPLEMENTATION * values[p.name])), bounds[name]
             parameters[p.name] = Quantity(
                 values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
             )

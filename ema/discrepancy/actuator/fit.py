@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -12,7 +12,7 @@ from ema.core.names import FAULTS
 from ema.effects import registry
 
 from .features import Array
-from .noise import Noise
+from .noise import Noise, disagreement, scatter
 from .plant import EmaPlant, Point, Steps
 
 N_SEEDS = 12  # for a column of the Jacobian, and for the base while searching
@@ -79,6 +79,8 @@ class Fit:
         Whitened residual by cycle, of the cycles it was fitted on.
     misfit : float
         Sum of squares over what noise makes of it.
+    sd : dict
+        Standard deviation of each free parameter: the larger of what noise and what the disagreement of motions makes.
     """
 
     point: Point
@@ -86,7 +88,7 @@ class Fit:
     columns: Columns
     residuals: dict[int, Array]
     misfit: float
-    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    sd: dict[str, float]
 
 
 def residuals(
@@ -197,7 +199,38 @@ def fit(
     if all(abs(d) <= abs(f.step) for d, f in zip(last, frees, strict=True)):
         point = moved(point, frees, last)
         res = residuals(plant, noise, point, cycles)
-    information = J.T @ J
-    covariance = np.linalg.pinv(information + 1e-12 * np.trace(information) / len(J.T) * np.eye(len(J.T)))
     found = [res[c] for c in cycles]
-    return Fit(point, tuple(frees), cols, res, noise.misfit(found, cycles), covariance)
+    solution = np.split(_pseudo_inverse(J), np.cumsum([len(r) for r in found])[:-1], axis=1)
+    return concluded(plant, noise, frees, point, cols, res, solution, 1.0 / N_SEEDS)
+
+
+def concluded(
+    plant: EmaPlant,
+    noise: Noise,
+    frees: Sequence[Free],
+    point: Point,
+    cols: Columns,
+    res: dict[int, Array],
+    solution: Sequence[Array],
+    extra: float,
+) -> Fit:
+    """The fit at a point, with what noise and the disagreement of motions make of its parameters.
+
+    Parameters
+    ----------
+    solution : sequence of arrays, shape (n_free, n_features)
+        What each cycle's whitened residual adds to the parameters.
+    extra : float
+        Variance of the predicted mean over that of one run (1 / number of seeds).
+    """
+    cycles, found = list(res), list(res.values())
+    misfit = noise.misfit(found, cycles)
+    random = (1.0 + extra) * max(misfit, 1.0) * scatter(noise, solution, cycles)
+    sd = np.sqrt(np.maximum(np.diag(random), np.diag(disagreement(plant.data, solution, found, cycles))))
+    return Fit(point, tuple(frees), cols, res, misfit, dict(zip((f.name for f in frees), sd.tolist(), strict=True)))
+
+
+def _pseudo_inverse(J: Array) -> Array:
+    scale = np.linalg.norm(J, axis=0)
+    scale[scale == 0.0] = 1.0
+    return np.asarray(np.linalg.pinv(J / scale, rcond=1e-10) / scale[:, None])

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import gamma
 
+from .cycles import Measured
 from .features import Array
 from .plant import EmaPlant, Point
 
@@ -32,12 +33,15 @@ class MotionNoise:
         Of the envelope. [A]
     fresh : array, shape (n_fresh, n_features)
         Whitened deviations of runs that the covariance has not seen.
+    step : array of int, shape (n_fresh,)
+        Which of the plant's `noise_steps` each of these runs has.
     """
 
     sd: Array
     L: Array
     envelope_sd: Array
     fresh: Array
+    step: np.ndarray
 
     def white(self, x: Array) -> Array:
         """Whitened rows of `x`, shape (..., n_features)."""
@@ -82,13 +86,15 @@ def motion_noise(plant: EmaPlant, point: Point, motion: int, n_runs: tuple[int, 
         away = (by_cycle - by_cycle.mean(axis=1, keepdims=True)) * np.sqrt(each / (each - 1.0))
         return away.transpose(1, 0, 2).reshape(n, -1)
 
-    x, new = np.split(deviations(runs.features + floor), [n * n_runs[0] // sum(n_runs)])
+    n_seen = n * n_runs[0] // sum(n_runs)
+    x, new = np.split(deviations(runs.features + floor), [n_seen])
+    step = (np.arange(n) % len(plant.noise_steps)).reshape(len(cycles), each).T.ravel()[n_seen:]
     sd = np.sqrt((x**2).mean(axis=0))
     z = x / sd
     correlation = (1.0 - shrinkage(z)) * (z.T @ z / len(z))
     np.fill_diagonal(correlation, 1.0)
     L = cholesky(correlation, lower=True, check_finite=False)
-    return MotionNoise(sd, L, deviations(runs.envelopes).std(axis=0), whitened(L, new / sd))
+    return MotionNoise(sd, L, deviations(runs.envelopes).std(axis=0), whitened(L, new / sd), step)
 
 
 class Noise:
@@ -107,6 +113,44 @@ class Noise:
         total = sum(float(r @ r) for r in residuals)
         expected = sum(float((self.of(c).fresh ** 2).sum(axis=1).mean()) for c in cycles)
         return total / expected
+
+
+def scatter(noise: Noise, solution: Sequence[Array], cycles: Sequence[int]) -> Array:
+    """Covariance of a linear estimate, shape (n, n), from runs that the weights have not seen.
+
+    What is random differs from cycle to cycle. What the step of the comparators makes is the same in all cycles of a
+    record, and no record tells the step; its part is the product of two halves of the runs, without a share of chance.
+
+    Parameters
+    ----------
+    solution : sequence of arrays, shape (n, n_features)
+        The estimate is the sum over cycles of these times the whitened features.
+    """
+    n, steps = len(solution[0]), range(len(noise.plant.noise_steps))
+    random, by_step = np.zeros((n, n)), np.zeros((2, len(steps), n))
+    for c, G in zip(cycles, solution, strict=True):
+        of = noise.of(c)
+        x = of.fresh @ G.T
+        groups = [x[of.step == s] for s in steps]
+        random += sum((len(g) - 1) * np.cov(g.T) for g in groups) / (len(x) - len(steps))
+        by_step += np.array([[g[half::2].mean(axis=0) for g in groups] for half in (0, 1)])
+    common = by_step[0].T @ by_step[1] / (len(steps) - 1)
+    common = 0.5 * (common + common.T)
+    return random + common * np.outer(sign := np.diag(common) > 0.0, sign)
+
+
+def disagreement(data: Measured, solution: Sequence[Array], residuals: Sequence[Array], cycles: Sequence[int]) -> Array:
+    """Covariance of a linear estimate, shape (n, n), from how differently the motions of a record draw it.
+
+    The sandwich covariance with motions as clusters: it sees a law of another form, which noise does not. [Liang and
+    Zeger, Biometrika 73, 1986]
+    """
+    motions = sorted({int(data.motion[c]) for c in cycles})
+    drawn = np.zeros((len(motions), len(solution[0])))
+    for c, G, r in zip(cycles, solution, residuals, strict=True):
+        drawn[motions.index(int(data.motion[c]))] += G @ r
+    away = drawn - drawn.mean(axis=0)
+    return np.asarray(away.T @ away) * len(motions) / max(len(motions) - 1, 1)
 
 
 @dataclass(frozen=True)

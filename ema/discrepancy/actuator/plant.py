@@ -96,6 +96,7 @@ class EmaPlant:
             self.plant, d.start[cycles_, 0] + unseen, d.start[cycles_, 1] - self._angle_error(points, cycles_)
         )
         start[:, STATE.index("w_m")] = d.speed[cycles_]
+        start[:, STATE.index("w_u")] = d.user_speed[cycles_]
         for j, phase in enumerate("abc"):  # the current that held it before
             for name in ("i", "lag1", "lag2"):
                 start[:, STATE.index(f"{name}_{phase}")] = d.holding[cycles_, j]

@@ -28,6 +28,7 @@ from .fit import (
     residuals,
     stacked_jacobian,
 )
+from .flat import settled
 from .noise import Noise, Verdict, verdict
 from .plant import EmaPlant, Point
 from .weak import Torque, torque
@@ -95,6 +96,14 @@ class Search:
     ) -> Model:
         """Fit on training cycles, judge on held-out ones."""
         fitted = fit(self.plant, self.noise, frees, start, self.train, known=known, n_iterations=n_iterations)
+        return self._judged(effects, fitted)
+
+    def settled(self, model: Model) -> Model:
+        """`model` at its minimum along what the record hardly feels, too."""
+        fitted = settled(self.plant, self.noise, model.fit, self.train)
+        return model if fitted is model.fit else self._judged(model.effects, fitted)
+
+    def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:
         left = residuals(self.plant, self.noise, fitted.point, self.heldout, N_FINAL, FINAL_SEED)
         made = Model(tuple(effects), fitted, self.noise.misfit(list(left.values()), self.heldout))
         self.tried.append(made)
