@@ -83,3 +83,15 @@ def test_a_noisier_sensor_is_neither_an_effect_nor_a_fault(hidden, shipped_plant
     )
     assert found.findings.verdict == "adequate"
     assert max(found.findings.gain.k_after) < 0.006
+
+
+def test_a_user_that_still_swings_starts_with_its_speed(hidden, shipped_plant):
+    """Behind a gear that gives, the user swings on when the rotor rests."""
+    motions = (hidden.chirp(), hidden.sine(4e-3, 6.0, 0.5))
+    soft = hidden.cycles(hidden.Flaws(compliance=2e-5, user_damping=10.0), 3, 11, motions)
+    found = prepared(shipped_plant, soft).user_speed
+    x = np.array([c["theta_u"][[0, 10, 20]] for c in soft])  # 1 ms apart; the resonance has 21 ms
+    rise = (4.0 * x[:, 1] - 3.0 * x[:, 0] - x[:, 2]) / 2e-3
+    assert found[0] == 0.0
+    assert max(abs(found)) > 5e-3
+    assert found == pytest.approx(rise, rel=0.1, abs=0.03)

@@ -27,7 +27,8 @@ HIDDEN = 2e-5  # [rad rms] noise of the rotor angle that its own motion hides
 MEDIAN_OF_NORMAL = 0.6745  # of |x| where x is standard normal
 AT_REST = 1e-3  # [s] at the start of a cycle, over which the position is averaged
 CLEAR = 4.0  # standard deviations
-STARTING = 10e-3  # [s] at the start of a cycle, over which the user's motion is a parabola
+STARTING = (10e-3, 7e-3, 5e-3, 3.5e-3, 2.5e-3)  # [s] at the start of a cycle
+AS_NOISE = 1.15  # times the noise that a curve through it may leave
 
 
 @dataclass(frozen=True)
@@ -111,10 +112,10 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
             everything.append((s, cycle))
     signals = [s for s, _ in everything]
     rest = max(1, round(AT_REST * plant.control.rate))
-    start = np.array([[s.theta_u[0, :rest].mean(), s.theta_m[0, 0]] for s in signals])
+    user = np.array([_user_at_start(s.theta_u[0], plant.control.rate) for s in signals])
+    start = np.column_stack([user[:, 0], [s.theta_m[0, 0] for s in signals]])
     holding = np.array([s.i[0, :, :rest].mean(axis=1) for s in signals])
     speed = np.array([_speed_at_start(s.theta_m[0], plant.control.rate) for s in signals])
-    user_speed = np.array([_user_speed_at_start(s.theta_u[0], plant.control.rate) for s in signals])
     dT = np.array([cycle["temp_w"].mean() - T_20 if with_temperature else 0.0 for _, cycle in everything])
     return Measured(
         tuple(labels),
@@ -125,7 +126,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
         [envelope(s.i, plant.control.rate)[0] for s in signals],
         start,
         speed,
-        user_speed,
+        user[:, 1],
         holding - holding.mean(axis=1, keepdims=True),
         dT,
         with_temperature,
@@ -168,11 +169,24 @@ def _speed_at_start(theta_m: Array, rate: float) -> float:
     return w if moving and abs(w) > max(AT_REST_SPEED, 3.0 * step * rate / m) else 0.0
 
 
-def _user_speed_at_start(theta_u: Array, rate: float) -> float:
-    """ω_u at the first sample by a parabola through the first ones; zero where that is not clear of its noise."""
-    t = np.arange(round(STARTING * rate)) / rate
-    (_, w, _), covariance = np.polyfit(t, theta_u[: len(t)], 2, cov=True)
-    return float(w) if w**2 > CLEAR**2 * covariance[1, 1] else 0.0
+def _user_at_start(theta_u: Array, rate: float) -> tuple[float, float]:
+    """θ_u and ω_u at the first sample, by the longest parabola that leaves noise; at rest unless ω_u is clear of it."""
+    x = theta_u[: round(STARTING[0] * rate)]
+    noise = float(np.sqrt(np.mean(np.diff(x, 3) ** 2) / 20.0))  # variance of a third difference: 1 + 9 + 9 + 1
+    theta = w = variance = 0.0
+    for duration in STARTING:
+        t = np.arange(round(duration * rate)) / rate
+        powers = t[:, None] ** np.arange(3)
+        solution, *_ = np.linalg.lstsq(powers, x[: len(t)], rcond=None)
+        theta, w, variance = (
+            float(solution[0]),
+            float(solution[1]),
+            noise**2 * float(np.linalg.inv(powers.T @ powers)[1, 1]),
+        )
+        if np.sqrt(np.mean((x[: len(t)] - powers @ solution) ** 2)) < AS_NOISE * noise:
+            break
+    is_moving = w**2 > CLEAR**2 * variance
+    return (theta, w) if is_moving else (float(x[: max(1, round(AT_REST * rate))].mean()), 0.0)
 
 
 def _step(x: Array) -> float:

@@ -93,9 +93,12 @@ def examine(
             if after is before:
                 before, verdict_before = other, w
             after, v = _grown(search, before, other, w, alike, conditions)
+    after, v = _settled(search, after, v)
+    settled = after
     after, v = _simpler(search, after, v, alike)
     after, v = _without_superfluous(search, after, v, alike)
-    after, v = _settled(search, after, v)
+    if after is not settled:
+        after, v = _settled(search, after, v)
     alike = [_still_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
     findings = _findings(search, before, after, v, alike)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
@@ -141,6 +144,8 @@ def _grown(
             search.noise = Noise(search.plant, after.fit.point)
             after = search.model(after.effects, after.fit.free, after.fit.point, after.fit.columns, 2)
         after, v = _surely(search, after, search.verdict(after), conditions)
+        if not v.is_noise:
+            after, v = _settled(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
 
@@ -169,10 +174,17 @@ def _with_other_step(search: Search, model: Model, v: Verdict, conditions: list[
 
 
 def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
-    """`model`, or where it leaves little, one with an effect for several faults that leaves no more."""
+    """`model`, or where it leaves little, one with an effect for several faults that leaves no more.
+
+    With no fewer parameters than `model` it must leave less.
+    """
     if not v.is_noise and model.excess > NEARLY:
         return model, v
-    simpler = [m for m in search.instead_of_faults(model) if m.heldout < model.heldout + SAME]
+    simpler = [
+        m
+        for m in search.instead_of_faults(model)
+        if m.heldout < model.heldout + (SAME if len(m.fit.free) < len(model.fit.free) else -CHANCE)
+    ]
     verdicts = [search.verdict(m) for m in simpler]
     as_good = [(m, w) for m, w in zip(simpler, verdicts, strict=True) if w.is_noise or not v.is_noise]
     if not as_good:
@@ -180,7 +192,9 @@ def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ..
     m, w = as_good[0]
     gone = [name for name in FAULTS if name not in {f.name for f in m.fit.free}]
     rivals = [n.names[-1] for n, _ in as_good[1:] if n.heldout - m.heldout < ALIKE * m.excess + CHANCE]
-    alike.append((f"{' and '.join(gone)} alike", *rivals))
+    seen = [name for name in registry()[m.names[-1]].mistaken_for if name in FAULTS]
+    same = f"{' and '.join(gone)} alike" if len(gone) > 1 else f"what {' and '.join(seen)} have in common"
+    alike.append((same, *rivals))
     search.say(f"{m.names[-1]} instead of {', '.join(gone)}: p = {w.p_value:.2g}")
     return m, w
 
@@ -188,9 +202,9 @@ def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ..
 def _without_superfluous(
     search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]
 ) -> tuple[Model, Verdict]:
-    """`model` without the effects that later ones have made superfluous."""
-    for effect in model.effects[:-1]:
-        if search.owed_to(model, effect) < CHANCE:
+    """`model` without the effects that others have made superfluous, or that have only led the fit there."""
+    for effect in model.effects:
+        if len(model.effects) > 1 and search.owed_to(model, effect) < CHANCE:
             reduced = search.without(model, effect)
             if reduced.heldout < model.heldout + SAME:
                 del alike[model.effects.index(effect)]
@@ -233,7 +247,12 @@ def _is_credible(model: Model) -> bool:
 
 def _does_it(search: Search, model: Model, previous: Model) -> bool:
     """Whether the gain is the effect's own, and not that of faults fitted anew."""
-    return search.owed_to(model, model.effects[-1]) > OWN_SHARE * (previous.heldout - model.heldout)
+    owed = search.owed_to(model, model.effects[-1])
+    if owed > OWN_SHARE * (previous.heldout - model.heldout):
+        return True
+    without = search.without(model, model.effects[-1])  # from here: `previous` may have ended in a false minimum
+    gain = without.excess - model.excess
+    return gain >= WORTH_IT * without.excess and CHANCE < OWN_SHARE * gain < owed
 
 
 def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]]) -> Findings:

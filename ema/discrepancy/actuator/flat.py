@@ -17,7 +17,7 @@ from .fit import Fit, bounded, bounds, concluded, moved, residuals, stacked_jaco
 from .noise import Noise
 from .plant import EmaPlant, Point
 
-FLAT = 0.1  # length of a direction over that of the longest, below which it is simulated itself
+FLAT = 0.2  # length of a direction over that of the longest, below which it is simulated itself
 N_SEEDS = 12  # of each half
 SEEDS = 4_000_000, 5_000_000
 REACHES = (1.0, 0.3, 0.1)  # steps of the finite differences, to each side

@@ -222,7 +222,7 @@ class Search:
         return sorted(refined.values(), key=lambda m: m.heldout)
 
     def instead_of_faults(self, model: Model) -> list[Model]:
-        """Models in which one effect stands for what several faults have in common, and at least two of them vanish.
+        """Models in which one effect stands for what several faults have in common, and as many of them vanish.
 
         A weaker magnet and three equal shorts are the same torque at the same current; the fewer causes, the likelier.
         """
@@ -232,7 +232,7 @@ class Search:
             faults = [name for name in registry()[c.effect].mistaken_for if name in FAULTS]
             common = min((k.get(name, 0.0) for name in faults), default=0.0)
             gone = [name for name in faults if k.get(name, 0.0) - common < K_SEEN]
-            if c.effect in model.names or common < K_SEEN or len(gone) < max(2, len(c.linear)):
+            if c.effect in model.names or common < K_SEEN or len(faults) < 2 or len(gone) < len(c.linear):
                 continue
             self.probe([c])
             rest = {name: 0.0 if name in gone else k[name] - common for name in faults}
@@ -290,10 +290,15 @@ class Search:
             k = model.fit.point
             common = min(k[name] for name in faults)
             less = (dict.fromkeys(faults, 0.0), {name: k[name] - common for name in faults})
-            simpler, simpler_cost = self._better([self.start_with(model, s.candidate, rest) for rest in less])
+            simpler, simpler_cost = self._better([self._alone(model, s.candidate, rest) for rest in less])
             if simpler_cost < NO_WORSE * cost:
                 start = simpler
         return self.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3)
+
+    def _alone(self, model: Model, c: Candidate, faults: Point) -> Point:
+        """The start with some faults at other values, from where the effect alone has gone as far as it can."""
+        start = self.start_with(model, c, faults)
+        return fit(self.plant, self.noise, c.frees, start, self.train, n_iterations=3).point
 
     def _stands_for_faults(self, model: Model, c: Candidate) -> bool:
         """Whether all of the several faults that the effect can be mistaken for are seen in the model."""
