@@ -161,11 +161,12 @@ class Search:
             ranked.append(Screened(promised, c, start))
         return sorted(ranked, key=lambda entry: entry.promised)
 
-    def owed_to(self, model: Model, effect: Candidate) -> float:
-        """How much of the held-out misfit comes back when an effect is switched off and all else stays."""
+    def owed_to(self, model: Model, effect: Candidate, *, in_training: bool = False) -> float:
+        """How much misfit comes back, held-out or in training, when an effect is switched off and all else stays."""
         neutral = {f.name: self.plant.neutral(f.name) for f in effect.frees}
-        left = residuals(self.plant, self.noise, {**model.fit.point, **neutral}, self.heldout, N_FINAL, FINAL_SEED)
-        return self.noise.misfit(list(left.values()), self.heldout) - model.heldout
+        cycles = self.train if in_training else self.heldout
+        left = residuals(self.plant, self.noise, {**model.fit.point, **neutral}, cycles, N_FINAL, FINAL_SEED)
+        return self.noise.misfit(list(left.values()), cycles) - (model.fit.misfit if in_training else model.heldout)
 
     def _columns(self, c: Candidate) -> Array:
         names = [Free(f"{c.key}/{j}", 0.0, 0.0, 1.0) for j in range(len(c.amounts))]
