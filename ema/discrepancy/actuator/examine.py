@@ -26,6 +26,7 @@ from .structure import structure
 
 MIN_CYCLES = 2
 IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
+FORM = 0.1  # of a value, for a rest as large as the whole effect: how much of a law of another form is taken for it
 WORTH_IT = 0.25  # share of what is left that a further effect must take on held-out cycles
 ENOUGH = 0.05  # share of what faults alone leave, from which effects explain it but for the form of their laws
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
@@ -275,7 +276,8 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
     if not search.plant.data.has_temperature:
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
     kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c not in odd]
-    found = [_found(search, after, c.effect, a) for c, a in kept]
+    rest = 0.0 if v.is_noise else float(np.sqrt(after.excess / max(before.excess, 1e-9)))
+    found = [_found(search, after, c.effect, a, rest) for c, a in kept]
     if too_little and found:
         notes.append(
             f"{', '.join(e.name for e in found)} would explain {share:.0%} of the rest: too little to be named"
@@ -298,7 +300,7 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
         {"name": " + ".join(m.names) or "faults only", "score": -m.heldout}
         for m in sorted(search.tried, key=lambda m: m.heldout)
     ]
-    unnamed = [_found(search, after, c.effect, (), "torque_line") for c in odd]
+    unnamed = [_found(search, after, c.effect, (), rest, "torque_line") for c in odd]
     return Findings(verdict, found, _gain(search, before, after), shape, tried, notes, unnamed=unnamed)
 
 
@@ -325,8 +327,13 @@ def _integer(fit: Fit) -> bool:
     return abs(order - round(order)) < max(NON_INTEGER, 3.0 * sd)
 
 
-def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...], told_as: str = "") -> FoundEffect:
-    """What was fitted as `effect`, told as that or as another effect with the same parameters."""
+def _found(
+    search: Search, model: Model, effect: str, alike: tuple[str, ...], rest: float, told_as: str = ""
+) -> FoundEffect:
+    """What was fitted as `effect`, told as that or as another effect with the same parameters.
+
+    `rest` is the amplitude of what is left above noise over that of what there was to explain.
+    """
     e = registry()[told_as or effect]
     fit = model.fit
     bounds = {f.name: f for f in fit.free}
@@ -335,7 +342,8 @@ def _found(search: Search, model: Model, effect: str, alike: tuple[str, ...], to
     for p in e.parameters:
         name = f"{effect}.{p.name}"
         if name in bounds:
-            sd, f = float(np.hypot(fit.sd[name], IMPLEMENTATION * values[p.name])), bounds[name]
+            sd = float(np.linalg.norm([fit.sd[name], IMPLEMENTATION * values[p.name], FORM * rest * values[p.name]]))
+            f = bounds[name]
             parameters[p.name] = Quantity(
                 values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
             )
