@@ -20,6 +20,7 @@ SEED = 1_000_000
 K_STEP = 0.03  # below, the switching noise of a difference is as large as the difference
 TRUSTED = 0.75  # share of the promised gain, below which columns are taken anew
 LENGTH = 150.0  # of a step, in standard deviations of a cycle: four times the noise of one cycle's features
+SHORT = 75.0  # of a step near the end, where the curvature of the response counts for more than noise
 
 
 @dataclass(frozen=True)
@@ -202,6 +203,17 @@ def fit(
     found = [res[c] for c in cycles]
     solution = np.split(_pseudo_inverse(J), np.cumsum([len(r) for r in found])[:-1], axis=1)
     return concluded(plant, noise, frees, point, cols, res, solution, 1.0 / N_SEEDS)
+
+
+def with_short_steps(plant: EmaPlant, noise: Noise, found: Fit, cycles: Sequence[int]) -> Fit:
+    """The fit gone on with, by differences over shorter steps."""
+    J = stacked_jacobian(noise, found.free, found.columns, cycles)
+    length = np.linalg.norm(J, axis=0) / np.sqrt(len(cycles))
+    frees = [
+        replace(f, step=float(np.sign(f.step)) * min(abs(f.step), SHORT / max(x, 1e-300)))
+        for f, x in zip(found.free, length, strict=True)
+    ]
+    return fit(plant, noise, frees, found.point, cycles, n_iterations=2)
 
 
 def concluded(

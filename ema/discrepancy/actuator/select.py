@@ -27,6 +27,7 @@ from .fit import (
     moved,
     residuals,
     stacked_jacobian,
+    with_short_steps,
 )
 from .flat import settled
 from .noise import Noise, Verdict, verdict
@@ -99,9 +100,11 @@ class Search:
         return self._judged(effects, fitted)
 
     def settled(self, model: Model) -> Model:
-        """`model` at its minimum along what the record hardly feels, too."""
+        """`model` at its minimum, along what the record hardly feels too."""
         fitted = settled(self.plant, self.noise, model.fit, self.train)
-        return model if fitted is model.fit else self._judged(model.effects, fitted)
+        if fitted is model.fit:
+            fitted = with_short_steps(self.plant, self.noise, model.fit, self.train)
+        return self._judged(model.effects, fitted)
 
     def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:
         left = residuals(self.plant, self.noise, fitted.point, self.heldout, N_FINAL, FINAL_SEED)
