@@ -266,7 +266,8 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
     )
     notes: list[str] = []
     shape: dict[str, Any] = {}
-    share = 1.0 - after.excess / max(before.excess, 1e-9)
+    left = after.excess / max(before.excess, 1e-9)
+    share = 1.0 - left
     too_little = verdict == "unexplained" and share < NAMED
     if verdict == "unexplained" or (after.effects and not v.is_noise):
         base = Model((), before.fit, before.heldout) if odd or too_little else after  # beside what is named
@@ -276,7 +277,7 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
     if not search.plant.data.has_temperature:
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
     kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c not in odd]
-    rest = 0.0 if v.is_noise else float(np.sqrt(after.excess / max(before.excess, 1e-9)))
+    rest = 0.0 if v.is_noise else float(np.sqrt(left))
     found = [_found(search, after, c.effect, a, rest) for c, a in kept]
     if too_little and found:
         notes.append(

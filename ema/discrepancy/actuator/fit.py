@@ -118,8 +118,7 @@ def stacked_jacobian(noise: Noise, frees: Sequence[Free], cols: Columns, cycles:
 
 def bounded(J: Array, r: Array, low: Array, high: Array) -> tuple[Array, float]:
     """Least-squares solution within bounds, and the squared residual it promises."""
-    scale = np.linalg.norm(J, axis=0)
-    scale[scale == 0.0] = 1.0
+    scale = _lengths(J)
     margin = 1e-12 * (1.0 + high - low)
     solved = lsq_linear(J / scale, r, ((low - margin) * scale, (high + margin) * scale), method="bvls")
     return np.clip(solved.x / scale, low, high), 2.0 * float(solved.cost)
@@ -242,7 +241,12 @@ def concluded(
     return Fit(point, tuple(frees), cols, res, misfit, dict(zip((f.name for f in frees), sd.tolist(), strict=True)))
 
 
+def _lengths(J: Array) -> Array:
+    """Lengths of the columns; one where there is nothing."""
+    length = np.linalg.norm(J, axis=0)
+    return np.where(length == 0.0, 1.0, length)
+
+
 def _pseudo_inverse(J: Array) -> Array:
-    scale = np.linalg.norm(J, axis=0)
-    scale[scale == 0.0] = 1.0
+    scale = _lengths(J)
     return np.asarray(np.linalg.pinv(J / scale, rcond=1e-10) / scale[:, None])
