@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ema.core.names import FAULTS
 from ema.effects import registry
 from ema.models.actuator import Actuator
 
@@ -45,6 +46,11 @@ class Candidate:
     fixed: Mapping[str, float]
     linear: tuple[str, ...]
     steps: tuple[float, ...]
+
+    @property
+    def faults(self) -> list[str]:
+        """Faults that the effect can be mistaken for."""
+        return [name for name in registry()[self.effect].mistaken_for if name in FAULTS]
 
     @property
     def key(self) -> str:

@@ -193,8 +193,8 @@ def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ..
     m, w = as_good[0]
     gone = [name for name in FAULTS if name not in {f.name for f in m.fit.free}]
     rivals = [n.names[-1] for n, _ in as_good[1:] if n.heldout - m.heldout < ALIKE * m.excess + CHANCE]
-    seen = [name for name in registry()[m.names[-1]].mistaken_for if name in FAULTS]
-    same = f"{' and '.join(gone)} alike" if len(gone) > 1 else f"what {' and '.join(seen)} have in common"
+    in_common = f"what {' and '.join(m.effects[-1].faults)} have in common"
+    same = f"{' and '.join(gone)} alike" if len(gone) > 1 else in_common
     alike.append((same, *rivals))
     search.say(f"{m.names[-1]} instead of {', '.join(gone)}: p = {w.p_value:.2g}")
     return m, w

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ema.core.names import FAULTS
-from ema.effects import registry
 
 from .candidates import Candidate, candidates
 from .features import Array
@@ -233,7 +232,7 @@ class Search:
         k = model.fit.point
         found = []
         for c in candidates(self.plant.plant, self.plant.data, []):
-            faults = [name for name in registry()[c.effect].mistaken_for if name in FAULTS]
+            faults = c.faults
             common = min((k.get(name, 0.0) for name in faults), default=0.0)
             gone = [name for name in faults if k.get(name, 0.0) - common < K_SEEN]
             if c.effect in model.names or common < K_SEEN or len(faults) < 2 or len(gone) < len(c.linear):
@@ -290,7 +289,7 @@ class Search:
         if self._stands_for_faults(model, s.candidate):
             # One effect for several faults, or for what they have in common, is the simpler cause; noise in the
             # columns would leave the faults there.
-            faults = [name for name in registry()[s.candidate.effect].mistaken_for if name in FAULTS]
+            faults = s.candidate.faults
             k = model.fit.point
             common = min(k[name] for name in faults)
             less = (dict.fromkeys(faults, 0.0), {name: k[name] - common for name in faults})
@@ -306,7 +305,7 @@ class Search:
 
     def _stands_for_faults(self, model: Model, c: Candidate) -> bool:
         """Whether all of the several faults that the effect can be mistaken for are seen in the model."""
-        faults = [name for name in registry()[c.effect].mistaken_for if name in FAULTS]
+        faults = c.faults
         return len(faults) > 1 and all(model.fit.point.get(name, 0.0) > K_SEEN for name in faults)
 
     def _clear(self, refined: dict[str, Model], promised: float) -> bool:
