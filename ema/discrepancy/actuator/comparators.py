@@ -22,7 +22,7 @@ def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]
     """The integration step with which `point` leaves clearly less of the cycles than now; None if there is none. [s]"""
 
     def excess(steps: tuple[float, ...] | None) -> float:
-        left = residuals(plant, noise, point, cycles, N_SEEDS, SEED, steps)
+        left = residuals(plant, noise, point, cycles, plant.n_seeds(cycles, N_SEEDS), SEED, steps)
         return max(noise.misfit(list(left.values()), cycles) - 1.0, 0.0)
 
     now = excess(None)

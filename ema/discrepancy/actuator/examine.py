@@ -373,12 +373,9 @@ def settled(plant: EmaPlant) -> int:
 def envelope_error(search: Search, point: Point, cycles: list[int]) -> float:
     """Rms of measured less mean simulated envelope over cycles. [A]"""
     plant = search.plant
-    total = []
-    for c in cycles:
-        runs = plant.simulate([point] * N_FINAL, [c] * N_FINAL, range(FINAL_SEED, FINAL_SEED + N_FINAL))
-        error = plant.data.envelopes[c][::ENVELOPE_STEP] - runs.envelopes.mean(axis=0)
-        total.append(np.mean(error[settled(plant) :] ** 2))
-    return float(np.sqrt(np.mean(total)))
+    runs = plant.repeated([point], cycles, N_FINAL, FINAL_SEED)[0]
+    errors = [plant.data.envelopes[c][::ENVELOPE_STEP] - runs[c].envelopes.mean(axis=0) for c in cycles]
+    return float(np.sqrt(np.mean([np.mean(e[settled(plant) :] ** 2) for e in errors])))
 
 
 def _gain(search: Search, before: Model, after: Model) -> Gain:

@@ -15,7 +15,8 @@ from .features import Array
 from .noise import Noise, disagreement, scatter
 from .plant import EmaPlant, Point, Steps
 
-N_SEEDS = 12  # for a column of the Jacobian, and for the base while searching
+N_SEEDS = 8  # at least, while searching
+N_COLUMN = 12  # seeds of a column of the Jacobian
 SEED = 1_000_000
 K_STEP = 0.03  # below, the switching noise of a difference is as large as the difference
 TRUSTED = 0.75  # share of the promised gain, below which columns are taken anew
@@ -58,12 +59,13 @@ def columns(plant: EmaPlant, frees: Sequence[Free], point: Point, motions: Seque
     if not frees:
         return {}
     moved = [column_points(point, f) for f in frees]
-    found: Columns = {}
-    for motion in motions:
-        means = plant.mean([point, *(p for p, _ in moved)], plant.first[motion], N_SEEDS, SEED)
-        for f, (_, step), mean in zip(frees, moved, means[1:], strict=True):
-            found[motion, f.name] = (mean - means[0]) / step
-    return found
+    first = [plant.first[motion] for motion in motions]
+    here, *means = plant.means([point, *(p for p, _ in moved)], first, N_COLUMN, SEED)
+    return {
+        (motion, f.name): (mean[c] - here[c]) / step
+        for f, (_, step), mean in zip(frees, moved, means, strict=True)
+        for motion, c in zip(motions, first, strict=True)
+    }
 
 
 @dataclass(frozen=True)
@@ -92,18 +94,31 @@ class Fit:
     sd: dict[str, float]
 
 
+def residuals_at(
+    plant: EmaPlant,
+    noise: Noise,
+    points: Sequence[Point],
+    cycles: Sequence[int],
+    n_seeds: int,
+    seed: int = SEED,
+    steps: Steps = None,
+) -> list[dict[int, Array]]:
+    """Whitened measured less mean simulated features at several points, by cycle."""
+    means = plant.means(points, cycles, n_seeds, seed, steps)
+    return [{c: noise.of(c).white(plant.data.y[c] - at[c]) for c in cycles} for at in means]
+
+
 def residuals(
     plant: EmaPlant,
     noise: Noise,
     point: Point,
     cycles: Sequence[int],
-    n_seeds: int = N_SEEDS,
+    n_seeds: int,
     seed: int = SEED,
     steps: Steps = None,
 ) -> dict[int, Array]:
-    """Whitened measured less mean simulated features, by cycle."""
-    means = plant.means(point, cycles, n_seeds, seed, steps)
-    return {c: noise.of(c).white(plant.data.y[c] - means[c]) for c in cycles}
+    """Whitened measured less mean simulated features at one point, by cycle."""
+    return residuals_at(plant, noise, [point], cycles, n_seeds, seed, steps)[0]
 
 
 def stacked_jacobian(noise: Noise, frees: Sequence[Free], cols: Columns, cycles: Sequence[int]) -> Array:
@@ -158,8 +173,9 @@ def fit(
 ) -> Fit:
     """Gauss–Newton from `start`; columns in `known` are used in the first iteration instead of new ones."""
     motions = sorted({int(plant.data.motion[c]) for c in cycles})
+    n_seeds = plant.n_seeds(cycles, N_SEEDS)
     point: Point = dict(start)
-    res = residuals(plant, noise, point, cycles)
+    res = residuals(plant, noise, point, cycles, n_seeds)
     cost = sum(float(r @ r) for r in res.values())
     cols: Columns = dict(known or {})
     J = np.empty((0, 0))
@@ -183,7 +199,7 @@ def fit(
         improved, gained, before, before_cost = False, 0.0, point, cost
         for share in (1.0, 0.5, 0.2):
             candidate = moved(point, frees, share * step)
-            new = residuals(plant, noise, candidate, cycles)
+            new = residuals(plant, noise, candidate, cycles, n_seeds)
             new_cost = sum(float(x @ x) for x in new.values())
             if new_cost < cost:
                 gained, improved = cost - new_cost, True
@@ -198,10 +214,10 @@ def fit(
     last, _ = bounded(J, np.concatenate([res[c] for c in cycles]), *bounds(frees, point))
     if all(abs(d) <= abs(f.step) for d, f in zip(last, frees, strict=True)):
         point = moved(point, frees, last)
-        res = residuals(plant, noise, point, cycles)
+        res = residuals(plant, noise, point, cycles, n_seeds)
     found = [res[c] for c in cycles]
     solution = np.split(_pseudo_inverse(J), np.cumsum([len(r) for r in found])[:-1], axis=1)
-    return concluded(plant, noise, frees, point, cols, res, solution, 1.0 / N_SEEDS)
+    return concluded(plant, noise, frees, point, cols, res, solution, 1.0 / n_seeds)
 
 
 def with_short_steps(plant: EmaPlant, noise: Noise, found: Fit, cycles: Sequence[int]) -> Fit:

@@ -58,8 +58,7 @@ def _envelope(e: Examination, cycles: list[int], points: list[Point]) -> Picture
         sd = e.search.noise.of(c).envelope_sd
         bottom.fill_between(t, -2 * sd, 2 * sd, color=NOISE, lw=0, label="switching noise, ±2σ")
         for point, (label, colour) in zip(points, _labels(points), strict=True):
-            runs = plant.simulate([point] * N_FINAL, [c] * N_FINAL, range(FINAL_SEED, FINAL_SEED + N_FINAL))
-            mean = runs.envelopes.mean(axis=0)
+            mean = plant.repeated([point], [c], N_FINAL, FINAL_SEED)[0][c].envelopes.mean(axis=0)
             top.plot(t, mean, color=colour, lw=0.8, label=label)
             bottom.plot(t, measured - mean, color=colour, lw=0.8)
         largest = np.abs(np.array(bottom.lines[0].get_ydata(), dtype=float)[settled(plant) : -2]).max()
@@ -76,9 +75,10 @@ def _envelope(e: Examination, cycles: list[int], points: list[Point]) -> Picture
 def _torques(e: Examination, point: Point) -> list[Torque]:
     plant = e.search.plant
     found = []
-    for c in range(plant.data.n_cycles):
+    means = plant.means([point], range(plant.data.n_cycles), N_FINAL, FINAL_SEED)[0]
+    for c, mean in means.items():
         at = plant.slices[int(plant.data.motion[c])]["torque"]
-        r = plant.data.y[c] - plant.mean([point], c, N_FINAL, FINAL_SEED)[0]
+        r = plant.data.y[c] - mean
         found.append(torque(plant.data.signals[c], r[at], e.search.noise.of(c).sd[at], plant.plant.control.rate))
     return found
 
@@ -153,12 +153,9 @@ def _phases(e: Examination, points: list[Point]) -> Picture:
     axes = figure.subplots(1, 3, sharey=True)
     centre = (np.arange(SECTORS) + 0.5) * 360.0 / SECTORS
     for point, (label, colour) in zip(points, _labels(points), strict=True):
-        tables = []
-        for c in range(plant.data.n_cycles):
-            at = plant.slices[int(plant.data.motion[c])]["phase"]
-            r = (plant.data.y[c] - plant.mean([point], c, N_FINAL, FINAL_SEED)[0])[at]
-            tables.append(r.reshape(2, 3, SECTORS))
-        mean = np.mean(tables, axis=0)
+        means = plant.means([point], range(plant.data.n_cycles), N_FINAL, FINAL_SEED)[0]
+        at = {c: plant.slices[int(plant.data.motion[c])]["phase"] for c in means}
+        mean = np.mean([(plant.data.y[c] - x)[at[c]].reshape(2, 3, SECTORS) for c, x in means.items()], axis=0)
         for j, ax in enumerate(axes):
             ax.plot(centre, 1e3 * mean[0, j], color=colour, lw=1.2, label=label)
             ax.plot(centre, 1e3 * mean[1, j], color=colour, lw=1.0, ls=":")

@@ -68,7 +68,7 @@ class EmaPlant:
     def simulate(
         self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], steps: Steps = None
     ) -> Runs:
-        """One run for each (point, cycle, seed), given as three sequences of one length; cycles of one motion.
+        """One run for each (point, cycle, seed), given as three sequences of one length; all cycles last as long.
 
         Integration steps take turns with the seeds: what is rounded alike in every run with one step averages out.
         """
@@ -87,7 +87,7 @@ class EmaPlant:
 
     def _simulate(self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], dt: float) -> Runs:
         d, n = self.data, len(points)
-        command = d.commands[d.motion[cycles[0]]]
+        command = np.array([d.commands[d.motion[c]] for c in cycles])
         k = np.array([[point.get(name, 0.0) for name in FAULTS] for point in points])
         effects = self._effects(points)
         cycles_ = np.asarray(cycles)
@@ -106,7 +106,7 @@ class EmaPlant:
             r = hf.simulate(
                 self.plant,
                 k[part],
-                command,
+                command[part],
                 seeds=np.asarray(seeds)[part],
                 start=start[part],
                 effects={e: {p: x[part] for p, x in values.items()} for e, values in effects.items()},
@@ -121,31 +121,41 @@ class EmaPlant:
             if d.angle_step:
                 theta_m = d.angle_step * np.round(theta_m / d.angle_step)
             u_dc = r.u_dc if d.signals[cycles[0]].u_dc is not None else None
-            signals = Signals(r.i, theta_m, r.theta_u, np.broadcast_to(command, theta_m.shape), u_dc)
+            signals = Signals(r.i, theta_m, r.theta_u, command[part], u_dc)
             all_features.append(stacked(features(self.plant, signals)))
             all_envelopes.append(r.envelope[:, ::ENVELOPE_STEP])
         self.n_runs += n
         return Runs(np.concatenate(all_features), np.concatenate(all_envelopes))
 
-    def means(
-        self, point: Point, cycles: Sequence[int], n_seeds: int, seed: int, steps: Steps = None
-    ) -> dict[int, Array]:
-        """Mean features of several cycles at one point, by cycle; each has its own seeds."""
-        found: dict[int, Array] = {}
-        for motion in sorted({int(self.data.motion[c]) for c in cycles}):
-            same = [c for c in cycles if self.data.motion[c] == motion]
-            of = [c for c in same for _ in range(n_seeds)]
-            seeds = [seed + 1000 * c + j for c in same for j in range(n_seeds)]
-            runs = self.simulate([point] * len(of), of, seeds, steps)
-            found |= dict(zip(same, runs.features.reshape(len(same), n_seeds, -1).mean(axis=1), strict=True))
+    def repeated(
+        self, points: Sequence[Point], cycles: Sequence[int], n_seeds: int, seed: int, steps: Steps = None
+    ) -> list[dict[int, Runs]]:
+        """Runs of several cycles at several points, by cycle; each cycle has its own seeds, which all points share."""
+        found: list[dict[int, Runs]] = [{} for _ in points]
+        n_times = [len(self.data.commands[self.data.motion[c]]) for c in cycles]
+        for length in sorted(set(n_times)):
+            same = [c for c, n in zip(cycles, n_times, strict=True) if n == length]
+            grid = [(p, c, j) for p in range(len(points)) for c in same for j in range(n_seeds)]
+            seeds = [seed + 1000 * c + j for _, c, j in grid]
+            runs = self.simulate([points[p] for p, _, _ in grid], [c for _, c, _ in grid], seeds, steps)
+            shape = len(points), len(same), n_seeds, -1
+            both = zip(runs.features.reshape(shape), runs.envelopes.reshape(shape), strict=True)
+            for at, (x, envelopes) in zip(found, both, strict=True):
+                at |= {c: Runs(*of) for c, *of in zip(same, x, envelopes, strict=True)}
         return found
 
-    def mean(self, points: Sequence[Point], cycle: int, n_seeds: int, seed: int, steps: Steps = None) -> Array:
-        """Mean features of a cycle at several points, (n_points, n_features). All points share their seeds."""
-        grid = [point for point in points for _ in range(n_seeds)]
-        seeds = [seed + j for _ in points for j in range(n_seeds)]
-        runs = self.simulate(grid, [cycle] * len(grid), seeds, steps)
-        return runs.features.reshape(len(points), n_seeds, -1).mean(axis=1)
+    def means(
+        self, points: Sequence[Point], cycles: Sequence[int], n_seeds: int, seed: int, steps: Steps = None
+    ) -> list[dict[int, Array]]:
+        """Mean features of several cycles at several points, by cycle."""
+        found = self.repeated(points, cycles, n_seeds, seed, steps)
+        return [{c: runs.features.mean(axis=0) for c, runs in at.items()} for at in found]
+
+    def n_seeds(self, cycles: Sequence[int], at_least: int) -> int:
+        """How many seeds of each of these cycles the lanes hold that `at_least` seeds need anyway."""
+        at_once = hf.N_LANES * len(self.steps)
+        n = at_once * -(-at_least * len(cycles) // at_once) // len(cycles)
+        return n - n % len(self.steps)
 
     def _effects(self, points: Sequence[Point]) -> dict[str, dict[str, Array]]:
         names = sorted({name for point in points for name in point if "." in name})

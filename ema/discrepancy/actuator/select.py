@@ -25,12 +25,13 @@ from .fit import (
     fit,
     moved,
     residuals,
+    residuals_at,
     stacked_jacobian,
     with_short_steps,
 )
 from .flat import settled
 from .noise import Noise, Verdict, verdict
-from .plant import EmaPlant, Point
+from .plant import EmaPlant, Point, Steps
 from .weak import Torque, torque
 
 N_FINAL = 16  # seeds of a mean that is judged
@@ -126,10 +127,11 @@ class Search:
         """What `model` leaves of the torque balance, by training cycle. [N m]"""
         plant = self.plant
         found = []
+        means = plant.means([model.fit.point], self.train, plant.n_seeds(self.train, N_SEEDS), SEED)[0]
         for c in self.train:
             motion = int(plant.data.motion[c])
             at = plant.slices[motion]["torque"]
-            r = plant.data.y[c] - plant.mean([model.fit.point], c, N_SEEDS, SEED)[0]
+            r = plant.data.y[c] - means[c]
             sd = self.noise.of(c).sd
             found.append(torque(plant.data.signals[c], r[at], sd[at], plant.plant.control.rate))
         return found
@@ -137,13 +139,16 @@ class Search:
     def probe(self, found: Sequence[Candidate]) -> None:
         """Fill in the columns (per unit) of candidates that were not probed before."""
         new = [c for c in found if (0, c.key + "/0") not in self.columns]
-        points = [p for c in new for p in c.probes()]
-        for motion in range(self.plant.n_motions if new else 0):
-            means = self.plant.mean([{}, *points], self.plant.first[motion], N_PROBE, SEED, (DT_PROBE,))
-            rows = iter(means[1:] - means[0])
-            for c in new:
-                for j, amount in enumerate(c.amounts):
-                    self.columns[motion, f"{c.key}/{j}"] = next(rows) / amount
+        if not new:
+            return
+        first = self.plant.first
+        here, *means = self.plant.means([{}, *(p for c in new for p in c.probes())], first, N_PROBE, SEED, (DT_PROBE,))
+        probed = iter(means)
+        for c in new:
+            for j, amount in enumerate(c.amounts):
+                mean = next(probed)
+                for motion, cycle in enumerate(first):
+                    self.columns[motion, f"{c.key}/{j}"] = (mean[cycle] - here[cycle]) / amount
 
     def screen(self, model: Model, found: Sequence[Candidate]) -> list[Screened]:
         """What each candidate promises to first order next to all that `model` has free, best first."""
@@ -176,10 +181,13 @@ class Search:
 
     def start_with(self, model: Model, c: Candidate, faults: Point) -> Point:
         """A start with some faults of `model` at other values, where the effect stands for what that takes away."""
+        return self._starts_with(model, [c], faults)[0]
+
+    def _starts_with(self, model: Model, found: Sequence[Candidate], faults: Point) -> list[Point]:
         point = {**model.fit.point, **faults}
         left = residuals(self.plant, self.noise, point, self.train, N_GLANCE)
-        step, _ = bounded(self._columns(c), np.concatenate([left[cycle] for cycle in self.train]), *c.limits())
-        return {**point, **c.start(step)}
+        r = np.concatenate([left[cycle] for cycle in self.train])
+        return [{**point, **c.start(bounded(self._columns(c), r, *c.limits())[0])} for c in found]
 
     def without(self, model: Model, effect: Candidate) -> Model:
         """The model fitted anew without one of its effects."""
@@ -269,11 +277,13 @@ class Search:
         motions = self.plant.data.motion
         cycles = [next(c for c in self.train if motions[c] == m) for m in sorted({int(motions[c]) for c in self.train})]
         share = len(self.train) / len(cycles)
+        alone = self._starts_with(model, [s.candidate for s in screened], dict.fromkeys(FAULTS, 0.0))
+        starts = [point for s, other in zip(screened, alone, strict=True) for point in (s.start, other)]
+        costs = self._costs(starts, cycles, (DT_PROBE,))
         ranked = []
-        for s in screened:
-            alone = self.start_with(model, s.candidate, dict.fromkeys(FAULTS, 0.0))
-            start, cost = self._better([s.start, alone], cycles)
-            ranked.append(Screened(share * cost, s.candidate, start))
+        for j, s in enumerate(screened):
+            cost, best = min((costs[at], at) for at in (2 * j, 2 * j + 1))
+            ranked.append(Screened(share * cost, s.candidate, starts[best]))
         return sorted(ranked, key=lambda entry: entry.promised)
 
     def _close(self, refined: dict[str, Model]) -> list[tuple[str, Model]]:
@@ -313,14 +323,16 @@ class Search:
         n = sum(len(self.plant.data.y[c]) for c in self.train)
         return promised / n > 3.0 * min(m.fit.misfit for m in refined.values()) + 0.5
 
-    def _better(self, starts: Sequence[Point], cycles: Sequence[int] | None = None) -> tuple[Point, float]:
-        """The start that simulates closest to the cycles (the training cycles), and its squared residual."""
+    def _better(self, starts: Sequence[Point]) -> tuple[Point, float]:
+        """The start that simulates closest to the training cycles, and its squared residual."""
+        costs = self._costs(starts, self.train)
+        best = int(np.argmin(costs))
+        return starts[best], costs[best]
 
-        def cost(point: Point) -> float:
-            left = residuals(self.plant, self.noise, point, cycles or self.train, N_GLANCE)
-            return sum(float(r @ r) for r in left.values())
-
-        return min(((point, cost(point)) for point in starts), key=lambda entry: entry[1])
+    def _costs(self, points: Sequence[Point], cycles: Sequence[int], steps: Steps = None) -> list[float]:
+        """Squared residual of some cycles at several points, at a glance."""
+        left = residuals_at(self.plant, self.noise, points, cycles, N_GLANCE, SEED, steps)
+        return [sum(float(r @ r) for r in at.values()) for at in left]
 
 
 def _stripped(model: Model, effect: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:
