@@ -13,14 +13,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from .features import Array
-from .fit import Fit, bounded, bounds, concluded, moved, residuals, stacked_jacobian
+from .fit import Fit, Free, bounded, bounds, concluded, moved, residuals_at, stacked_jacobian
 from .noise import Noise
 from .plant import EmaPlant, Point
 
 FLAT = 0.2  # length of a direction over that of the longest, below which it is simulated itself
-N_SEEDS = 12  # of each half
+N_SEEDS = 12  # at least, of each half
 SEEDS = 4_000_000, 5_000_000
 REACHES = (1.0, 0.3, 0.1)  # steps of the finite differences, to each side
+N_TURNS = 8  # at most
+ARRIVED = 0.5  # share of a reach that a turn may still go, to look closer
 CLEAR = 4.0  # times its noise: information of a direction, below which steps are not made shorter
 
 
@@ -35,21 +37,26 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
     if n == len(length):
         return fit
     U, steep, flat = U[:, :n], length[:n, None] * V[:n] * scale, V[n:] * scale
+    n_seeds = plant.n_seeds(cycles, N_SEEDS)
     point: Point = fit.point
     solution = np.empty((0, 0))
-    for reach in REACHES:
-        here = _halves(plant, noise, point, cycles)
+    reaches = list(REACHES)
+    for _ in range(N_TURNS):
+        ends = [
+            (_towards(fit.free, point, -reaches[0], v), _towards(fit.free, point, reaches[0], v))
+            for v in flat / scale**2
+        ]
+        ways = np.array([v @ _difference(fit.free, *pair) for v, pair in zip(flat, ends, strict=True)])
+        if not (ways > 0.0).all():
+            return fit
+        here, *there = _halves(plant, noise, [point, *(p for pair in ends for p in pair)], cycles, n_seeds)
         system, known, rows = [steep], [U.T @ here.mean(axis=0)], [U.T]
         is_clear = True
-        for v in flat:
-            low, high = (_towards(fit, point, sign * reach, v / scale**2) for sign in (-1.0, 1.0))
-            way = float(v @ [high[f.name] - low[f.name] for f in fit.free])
-            if way <= 0.0:
-                return fit
-            c = (_halves(plant, noise, low, cycles) - _halves(plant, noise, high, cycles)) / way
+        for v, way, low, high in zip(flat, ways, there[::2], there[1::2], strict=True):
+            c = (low - high) / way
             system[0] = system[0] + np.outer(U.T @ c.mean(axis=0), v)
             c -= c @ U @ U.T
-            of_noise = float(np.sqrt(c.shape[1])) * 2.0 / N_SEEDS / way**2
+            of_noise = float(np.sqrt(c.shape[1])) * 2.0 / n_seeds / way**2
             information = max(float(c[0] @ c[1]), of_noise)
             is_clear &= information >= CLEAR * of_noise
             system.append(np.sqrt(information) * v[None])
@@ -61,18 +68,34 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
         step, _ = bounded(A, np.concatenate(known), *bounds(fit.free, point))
         point = moved(point, fit.free, step)
         solution = np.linalg.solve(A, np.concatenate(rows))
-    left = residuals(plant, noise, point, cycles, N_SEEDS, SEEDS[0])
+        if (np.abs(flat @ step) < ARRIVED * 0.5 * ways).all():
+            del reaches[0]
+        if not reaches:
+            break
+    left = {c: x.mean(axis=0) for c, x in _by_cycle(plant, noise, [point], cycles, n_seeds)[0].items()}
     parts = np.split(solution, np.cumsum([len(left[c]) for c in cycles])[:-1], axis=1)
-    return concluded(plant, noise, fit.free, point, fit.columns, left, parts, 0.5 / N_SEEDS)
+    return concluded(plant, noise, fit.free, point, fit.columns, left, parts, 0.5 / n_seeds)
 
 
-def _halves(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]) -> Array:
-    """Whitened residuals of all cycles one behind the other, twice: shape (2, n_features of all)."""
-    found = [residuals(plant, noise, point, cycles, N_SEEDS, seed) for seed in SEEDS]
-    return np.array([np.concatenate([half[c] for c in cycles]) for half in found])
+def _by_cycle(
+    plant: EmaPlant, noise: Noise, points: Sequence[Point], cycles: Sequence[int], n_seeds: int
+) -> list[dict[int, Array]]:
+    """Whitened residuals at several points by cycle, twice: shape (2, n_features)."""
+    first, second = (residuals_at(plant, noise, points, cycles, n_seeds, seed) for seed in SEEDS)
+    return [{c: np.array([a[c], b[c]]) for c in cycles} for a, b in zip(first, second, strict=True)]
 
 
-def _towards(fit: Fit, point: Point, reach: float, along: Array) -> Point:
+def _halves(plant: EmaPlant, noise: Noise, points: Sequence[Point], cycles: Sequence[int], n_seeds: int) -> list[Array]:
+    """Whitened residuals at several points, all cycles one behind the other, twice: shape (2, n_features of all)."""
+    found = _by_cycle(plant, noise, points, cycles, n_seeds)
+    return [np.concatenate([at[c] for c in cycles], axis=1) for at in found]
+
+
+def _difference(frees: Sequence[Free], low: Point, high: Point) -> Array:
+    return np.array([high[f.name] - low[f.name] for f in frees])
+
+
+def _towards(frees: Sequence[Free], point: Point, reach: float, along: Array) -> Point:
     """The point as many steps of finite differences along a direction, inside bounds."""
-    amount = reach * float(np.min([abs(f.step) for f in fit.free] / np.abs(along)))
-    return moved(point, fit.free, np.clip(amount * along, *bounds(fit.free, point)))
+    amount = reach * float(np.min([abs(f.step) for f in frees] / np.abs(along)))
+    return moved(point, frees, np.clip(amount * along, *bounds(frees, point)))
