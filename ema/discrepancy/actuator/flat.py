@@ -4,11 +4,13 @@ The Jacobian's columns are differences of simulated means over steps of a few hu
 cancel, their difference is noise and curvature. What is left of the direction itself is stick, slip and switching that
 shift in time: felt over short steps, and on the side where the truth lies. So such a direction is simulated itself, to
 both sides, over shorter and shorter steps, and twice with other seeds: the product of two halves has no share of noise.
+Where the last turns wander still, their mean is taken, and their scatter is part of the deviations.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -41,6 +43,7 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
     point: Point = fit.point
     solution = np.empty((0, 0))
     reaches = list(REACHES)
+    last: list[Point] = []
     for _ in range(N_TURNS):
         ends = [
             (_towards(fit.free, point, -reaches[0], v), _towards(fit.free, point, reaches[0], v))
@@ -68,13 +71,18 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
         step, _ = bounded(A, np.concatenate(known), *bounds(fit.free, point))
         point = moved(point, fit.free, step)
         solution = np.linalg.solve(A, np.concatenate(rows))
+        last += [point] if len(reaches) == 1 else []
         if (np.abs(flat @ step) < ARRIVED * 0.5 * ways).all():
             del reaches[0]
         if not reaches:
             break
+    else:
+        point = {name: float(np.mean([p[name] for p in last])) for name in point} if last else point
     left = {c: x.mean(axis=0) for c, x in _by_cycle(plant, noise, [point], cycles, n_seeds)[0].items()}
     parts = np.split(solution, np.cumsum([len(left[c]) for c in cycles])[:-1], axis=1)
-    return concluded(plant, noise, fit.free, point, fit.columns, left, parts, 0.5 / n_seeds)
+    found = concluded(plant, noise, fit.free, point, fit.columns, left, parts, 0.5 / n_seeds)
+    sd = {name: float(np.hypot(x, np.std([p[name] for p in last or [point]]))) for name, x in found.sd.items()}
+    return replace(found, sd=sd)
 
 
 def _by_cycle(
