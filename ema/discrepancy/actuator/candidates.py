@@ -7,7 +7,7 @@ are the columns with which all candidates are screened at once, linearly. Only t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from .plant import Point
 from .weak import Torque, bumps, lines
 
 FLAT, FLAT_SAMPLES = 5e-3, 10  # [A] samples of one cycle at the largest current that make a clipped top
+CLIPPED_STEP = 0.05  # [A] of the finite difference of a converter's limit
 WARMER = 3.0  # [K] spread of winding temperature below which nothing can be said about temperature
 
 
@@ -70,6 +71,13 @@ class Candidate:
             for name, step in zip(self.linear, self.steps, strict=True)
         ]
 
+    def wider(self, factor: float) -> Candidate:
+        """The same with longer steps, inside bounds."""
+        low, high = self.limits()
+        steps = np.array(self.steps) + np.clip(factor * self.amounts, low, high) - self.amounts
+        frees = [replace(f, step=factor * f.step) if f.name.split(".")[1] in self.linear else f for f in self.frees]
+        return replace(self, steps=tuple(steps.tolist()), frees=tuple(frees))
+
     def limits(self) -> tuple[Array, Array]:
         """Bounds of the linear parameters, less neutral."""
         parameters = {p.name: p for p in registry()[self.effect].parameters}
@@ -85,6 +93,15 @@ class Candidate:
         return {f.name: float(np.clip(point[f.name], f.low, f.high)) for f in self.frees} | {
             name: value for name, value in point.items() if name not in {f.name for f in self.frees}
         }
+
+
+@dataclass(frozen=True)
+class Seen(Candidate):
+    """An effect that is plain to see in the record: a fit begins with what is seen there."""
+
+    def start(self, values: Array) -> Point:
+        """The probe."""
+        return self.probes()[0]
 
 
 @dataclass(frozen=True)
@@ -157,7 +174,8 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque]) -> li
         found.append(_plain("winding_resistance", "per_kelvin"))
     top = max(float(np.abs(s.i).max()) for s in data.signals)
     if any(int((np.abs(s.i) > top - FLAT).sum()) >= FLAT_SAMPLES for s in data.signals):
-        found.append(_plain("adc_saturation", "limit", step={"limit": top - 30.0}))
+        limit = free("adc_saturation.limit", CLIPPED_STEP)
+        found.append(Seen("adc_saturation", (limit,), {}, ("limit",), (top,)))
     if not torques:
         return found
     gear = resonance(plant, data)

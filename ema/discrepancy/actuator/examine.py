@@ -86,8 +86,12 @@ def examine(
     verdict_before = v
     say(f"faults only: p = {v.p_value:.2g}, most visible: {v.loudest}")
     alike: list[tuple[str, ...]] = []
-    after, v = _simpler(search, before, v, alike)
-    after, v = _grown(search, before, after, v, alike, conditions)
+    after = before
+    faults_do = v.is_noise
+    if faults_do:
+        after, v = _simpler(search, before, v, alike)
+    else:  # first what is wrong, then what is simpler
+        after, v = _grown(search, before, after, v, alike, conditions)
     if not v.is_noise:  # the library had its chance
         other, w = _with_other_step(search, after, v, conditions)
         if other is not after:
@@ -96,7 +100,8 @@ def examine(
             after, v = _grown(search, before, other, w, alike, conditions)
     after, v = _settled(search, after, v)
     settled = after
-    after, v = _simpler(search, after, v, alike)
+    if not faults_do:
+        after, v = _simpler(search, after, v, alike)
     after, v = _without_superfluous(search, after, v, alike)
     if after is not settled:
         after, v = _settled(search, after, v)
@@ -181,11 +186,13 @@ def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ..
     """
     if not v.is_noise and model.excess > NEARLY:
         return model, v
-    simpler = [
-        m
-        for m in search.instead_of_faults(model)
-        if m.heldout < model.heldout + (SAME if len(m.fit.free) < len(model.fit.free) else -CHANCE)
-    ]
+    simpler = []
+    for m in search.instead_of_faults(model):
+        most = model.heldout + (SAME if len(m.fit.free) < len(model.fit.free) else -CHANCE)
+        if most <= m.heldout < most + SLACK:  # not at its minimum yet
+            m = search.settled(m)
+        if m.heldout < most:
+            simpler.append(m)
     verdicts = [search.verdict(m) for m in simpler]
     as_good = [(m, w) for m, w in zip(simpler, verdicts, strict=True) if w.is_noise or not v.is_noise]
     if not as_good:

@@ -37,12 +37,16 @@ from .weak import Torque, torque
 N_FINAL = 16  # seeds of a mean that is judged
 FINAL_SEED = 3_000_000
 N_GLANCE = 4  # seeds that tell a good start from a bad one
-N_PROBE = 8  # seeds of a column that only screens
+N_PROBE, N_PROBE_HIDDEN = 8, 24  # seeds of a column that only screens; of one that is hardly felt
+WIDER = 3.0  # times the step of an effect that is hardly felt
+FELT = 0.5  # cosine between halves of the seeds, below which a column is mostly noise
 DT_PROBE = 2e-6  # [s] step of a simulation that only screens: its columns are within 4 % (12 % for dead time)
 N_REFINED = 4
-WORTH_A_FIT = 0.9  # share of the squared residual a candidate may leave, to first order
+WORTH_A_FIT = 0.1  # share of the squared residual beyond noise that a candidate must promise, to first order
+AT_LEAST = 0.01  # share of the whole squared residual that it must promise
 N_REFINED_AT_LEAST = 2
 NO_WORSE = 1.5  # times the squared residual of the best start, from which a start with fewer faults is not preferred
+HOPELESS = 5.0  # held-out misfit after a few steps from which an effect in place of faults is given up
 ONE_CAUSE = 0.25  # relative spread up to which several parameters are one cause
 K_SEEN = 0.01  # a fault that is there
 COLLINEAR = 0.9  # cosine from which two effects look like each other
@@ -85,6 +89,7 @@ class Search:
     heldout: list[int]
     say: Say = lambda text: None
     columns: dict[tuple[int, str], Array] = field(default_factory=dict)
+    probed: dict[str, Candidate] = field(default_factory=dict)
     tried: list[Model] = field(default_factory=list)
 
     def model(
@@ -136,23 +141,39 @@ class Search:
             found.append(torque(plant.data.signals[c], r[at], sd[at], plant.plant.control.rate))
         return found
 
-    def probe(self, found: Sequence[Candidate]) -> None:
-        """Fill in the columns (per unit) of candidates that were not probed before."""
-        new = [c for c in found if (0, c.key + "/0") not in self.columns]
-        if not new:
-            return
+    def probe(self, found: Sequence[Candidate]) -> list[Candidate]:
+        """Fill in the columns (per unit) of what was not probed before; what is hardly felt comes with longer steps."""
+        new = [c for c in found if c.key not in self.probed]
+        hidden = self._probe(new, N_PROBE)
+        self._probe([c.wider(WIDER) for c in new if c.key in hidden], N_PROBE_HIDDEN)
+        return [self.probed[c.key] for c in found]
+
+    def _probe(self, found: Sequence[Candidate], n_seeds: int) -> set[str]:
+        """Simulate probes; keys of candidates whose columns are mostly noise, as two halves of the seeds tell."""
+        if not found:
+            return set()
         first = self.plant.first
-        here, *means = self.plant.means([{}, *(p for c in new for p in c.probes())], first, N_PROBE, SEED, (DT_PROBE,))
-        probed = iter(means)
-        for c in new:
+        points = [{}, *(p for c in found for p in c.probes())]
+        here, *there = self.plant.repeated(points, first, n_seeds, SEED, (DT_PROBE,))
+        probed, hidden = iter(there), set()
+        for c in found:
+            self.probed[c.key] = c
             for j, amount in enumerate(c.amounts):
-                mean = next(probed)
+                runs = next(probed)
+                halves = []
                 for motion, cycle in enumerate(first):
-                    self.columns[motion, f"{c.key}/{j}"] = (mean[cycle] - here[cycle]) / amount
+                    column = (runs[cycle].features - here[cycle].features) / amount
+                    self.columns[motion, f"{c.key}/{j}"] = column.mean(axis=0)
+                    white = self.noise.motions[motion].white(column)
+                    halves.append([white[half::2].mean(axis=0) for half in (0, 1)])
+                a, b = np.concatenate(halves, axis=1)
+                if a @ b < FELT * np.linalg.norm(a) * np.linalg.norm(b):
+                    hidden.add(c.key)
+        return hidden
 
     def screen(self, model: Model, found: Sequence[Candidate]) -> list[Screened]:
         """What each candidate promises to first order next to all that `model` has free, best first."""
-        self.probe(found)
+        found = self.probe(found)
         f = model.fit
         own = stacked_jacobian(self.noise, f.free, f.columns, self.train)
         r = np.concatenate([f.residuals[c] for c in self.train])
@@ -208,6 +229,7 @@ class Search:
         ]
         refined: dict[str, Model] = {}
         cost = sum(float(r @ r) for r in model.fit.residuals.values())
+        worth = max(WORTH_A_FIT * (cost - cost / model.fit.misfit), AT_LEAST * cost)
         screened = self.screen(model, found)
         if model.excess > FAR:
             screened = self._simulated(model, screened)
@@ -216,7 +238,7 @@ class Search:
                 refined[s.candidate.effect] = self._refined(model, s)
         others: dict[str, Model] = {}
         for s in screened:
-            if (refined or others) and s.promised > WORTH_A_FIT * cost:
+            if (refined or others) and cost - s.promised < worth:
                 break
             if len(others) >= N_REFINED or (len(others) >= N_REFINED_AT_LEAST and self._clear(others, s.promised)):
                 break
@@ -245,11 +267,14 @@ class Search:
             gone = [name for name in faults if k.get(name, 0.0) - common < K_SEEN]
             if c.effect in model.names or common < K_SEEN or len(faults) < 2 or len(gone) < len(c.linear):
                 continue
-            self.probe([c])
+            (c,) = self.probe([c])
             rest = {name: 0.0 if name in gone else k[name] - common for name in faults}
             start = self.start_with(model, c, rest)
             frees = tuple(f for f in model.fit.free if f.name not in gone)
-            made = self.model((*model.effects, c), (*frees, *c.frees), start, None, 10)
+            made = self.model((*model.effects, c), (*frees, *c.frees), start, None, 3)
+            if made.heldout > HOPELESS:
+                continue
+            made = self.model(made.effects, made.fit.free, made.fit.point, made.fit.columns, 7)
             values = np.array([made.fit.point[f"{c.effect}.{name}"] for name in c.linear])
             if np.ptp(values) <= ONE_CAUSE * abs(values.mean()):
                 found.append(made)
