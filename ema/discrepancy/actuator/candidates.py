@@ -113,6 +113,10 @@ class Line(Candidate):
         """Amplitude of both probes."""
         return np.repeat(np.array(self.steps), 2)
 
+    def wider(self, factor: float) -> Candidate:
+        """The same with a larger amplitude."""
+        return replace(self, steps=tuple(factor * x for x in self.steps))
+
     def probes(self) -> list[Point]:
         """Sine and cosine of the line."""
         on = {f"{self.effect}.{n}": v for n, v in self.fixed.items()} | {f"{self.effect}.amplitude": self.steps[0]}

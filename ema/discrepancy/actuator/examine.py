@@ -32,6 +32,7 @@ ENOUGH = 0.05  # share of what faults alone leave, from which effects explain it
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
 NAMED = 0.95  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
 OWN_SHARE = 0.5  # of a gain that must go when the effect alone is switched off
+DISTANT = 10.0  # excess of a model that is far from the data
 ALIKE = 0.6  # share by which two models may leave more or less and be alike: laws are approximations
 NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
 CLOSE = 0.5  # share of what was left, from which another turn is not worth it
@@ -257,12 +258,18 @@ def _does_it(search: Search, model: Model, previous: Model) -> bool:
     """Whether the gain is the effect's own, and not that of faults fitted anew.
 
     Where only motions of training reach it, as a voltage limit, held-out ones gain by faults that are no longer bent.
+    Far from the data, where the noise of another point weighs, only a fit without the effect from there can tell.
     """
     effect = model.effects[-1]
     if search.owed_to(model, effect) > OWN_SHARE * (previous.heldout - model.heldout):
         return True
     gain = previous.fit.misfit - model.fit.misfit
-    return gain > CHANCE and search.owed_to(model, effect, in_training=True) > OWN_SHARE * gain
+    if gain > CHANCE and search.owed_to(model, effect, in_training=True) > OWN_SHARE * gain:
+        return True
+    if previous.excess < DISTANT:
+        return False
+    without = search.without(model, effect)
+    return without.excess - model.excess > WORTH_IT * without.excess
 
 
 def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]]) -> Findings:
