@@ -183,24 +183,28 @@ def _with_other_step(search: Search, model: Model, v: Verdict, conditions: list[
 def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
     """`model`, or where it leaves little, one with an effect for several faults that leaves no more.
 
-    With no fewer parameters than `model` it must leave less.
+    With no fewer parameters than `model` it must leave less. What runs differ by depends on the model too, so either is
+    weighed by the noise of both.
     """
     if not v.is_noise and model.excess > NEARLY:
         return model, v
-    simpler = []
+    as_good = []
+    here = search.noise
     for m in search.instead_of_faults(model):
-        most = model.heldout + (SAME if len(m.fit.free) < len(model.fit.free) else -CHANCE)
-        if most <= m.heldout < most + SLACK:  # not at its minimum yet
-            m = search.settled(m)
-        if m.heldout < most:
-            simpler.append(m)
-    verdicts = [search.verdict(m) for m in simpler]
-    as_good = [(m, w) for m, w in zip(simpler, verdicts, strict=True) if w.is_noise or not v.is_noise]
+        if m.heldout > model.heldout + NEARLY:
+            continue
+        search.noise = Noise(search.plant, m.fit.point)
+        m = search.model(m.effects, m.fit.free, m.fit.point, m.fit.columns, 1)
+        more = search.left_more(m, model, (here, search.noise))
+        w = search.verdict(m)
+        if more < (SAME if len(m.fit.free) < len(model.fit.free) else -CHANCE) and (w.is_noise or not v.is_noise):
+            as_good.append((more, m, w, search.noise))
+    search.noise = here
     if not as_good:
         return model, v
-    m, w = as_good[0]
+    least, m, w, search.noise = min(as_good, key=lambda found: found[0])
     gone = [name for name in FAULTS if name not in {f.name for f in m.fit.free}]
-    rivals = [n.names[-1] for n, _ in as_good[1:] if n.heldout - m.heldout < ALIKE * m.excess + CHANCE]
+    rivals = [n.names[-1] for more, n, *_ in as_good if n is not m and more - least < ALIKE * m.excess + CHANCE]
     in_common = f"what {' and '.join(m.effects[-1].faults)} have in common"
     same = f"{' and '.join(gone)} alike" if len(gone) > 1 else in_common
     alike.append((same, *rivals))

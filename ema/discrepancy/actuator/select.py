@@ -128,6 +128,16 @@ class Search:
         cols = [self.noise.motions[m].white(np.array([known[m, f.name] for f in frees])).T for m in motions]
         return verdict(self.noise, [left[c] for c in cycles], cycles, cols, 1.0 / N_FINAL)
 
+    def left_more(self, model: Model, other: Model, noises: Sequence[Noise]) -> float:
+        """How much more misfit `model` leaves of all cycles than `other`, on average over noise models."""
+        cycles, y = sorted(self.train + self.heldout), self.plant.data.y
+        means = self.plant.means([model.fit.point, other.fit.point], cycles, N_FINAL, FINAL_SEED)
+        misfits = [
+            [noise.misfit([noise.of(c).white(y[c] - at[c]) for c in cycles], cycles) for at in means]
+            for noise in noises
+        ]
+        return float(np.mean([mine - others for mine, others in misfits]))
+
     def torques(self, model: Model) -> list[Torque]:
         """What `model` leaves of the torque balance, by training cycle. [N m]"""
         plant = self.plant
