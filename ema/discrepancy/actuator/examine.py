@@ -37,6 +37,7 @@ ALIKE = 0.6  # share by which two models may leave more or less and be alike: la
 NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
 CLOSE = 0.5  # share of what was left, from which another turn is not worth it
 CHANCE = 0.03  # difference in misfit that seeds make
+SURE = 0.1  # gain in misfit from which an effect is preferred to faults that explain a record just as simply
 SAME = 0.05  # difference in held-out misfit up to which fewer causes are preferred
 NEARLY = 0.5  # excess of a model that may be the right one but for switching
 SLACK = 0.1  # misfit that switching noise may make
@@ -183,8 +184,8 @@ def _with_other_step(search: Search, model: Model, v: Verdict, conditions: list[
 def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
     """`model`, or where it leaves little, one with an effect for several faults that leaves no more.
 
-    With no fewer parameters than `model` it must leave less. What runs differ by depends on the model too, so either is
-    weighed by the noise of both.
+    With no fewer parameters than `model` it must leave less, and clearly so where faults need no effect beside them. What
+    runs differ by depends on the model too, so either is weighed by the noise of both.
     """
     if not v.is_noise and model.excess > NEARLY:
         return model, v
@@ -197,7 +198,8 @@ def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ..
         m = search.model(m.effects, m.fit.free, m.fit.point, m.fit.columns, 1)
         more = search.left_more(m, model, (here, search.noise))
         w = search.verdict(m)
-        if more < (SAME if len(m.fit.free) < len(model.fit.free) else -CHANCE) and (w.is_noise or not v.is_noise):
+        fewer = len(m.fit.free) < len(model.fit.free)
+        if more < (SAME if fewer else -CHANCE if model.effects else -SURE) and (w.is_noise or not v.is_noise):
             as_good.append((more, m, w, search.noise))
     search.noise = here
     if not as_good:
