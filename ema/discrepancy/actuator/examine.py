@@ -184,8 +184,8 @@ def _with_other_step(search: Search, model: Model, v: Verdict, conditions: list[
 def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
     """`model`, or where it leaves little, one with an effect for several faults that leaves no more.
 
-    With no fewer parameters than `model` it must leave less, and clearly so where faults need no effect beside them. What
-    runs differ by depends on the model too, so either is weighed by the noise of both.
+    With no fewer parameters than `model` it must leave less, and clearly so where faults need no effect beside them.
+    What runs differ by depends on the model too, so either is weighed by the noise of both.
     """
     if not v.is_noise and model.excess > NEARLY:
         return model, v
