@@ -21,7 +21,7 @@ from .extension import as_extension
 from .fit import Fit
 from .noise import N_RUNS_SURE, Noise, Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
-from .select import FINAL_SEED, MAX_EFFECTS, N_FINAL, Model, Search, start_model
+from .select import FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, Model, Search, start_model
 from .structure import structure
 
 MIN_CYCLES = 2
@@ -353,17 +353,22 @@ def _found(
 ) -> FoundEffect:
     """What was fitted as `effect`, told as that or as another effect with the same parameters.
 
-    `rest` is the amplitude of what is left above noise over that of what there was to explain.
+    `rest` is the amplitude of what is left above noise over that of what there was to explain. A fault that the effect
+    took the place of was taken for none; it may be as large as what is not seen.
     """
     e = registry()[told_as or effect]
     fit = model.fit
     bounds = {f.name: f for f in fit.free}
+    c = next(c for c in model.effects if c.effect == effect)
+    gone = [name for name in c.faults if name not in bounds]
+    small = K_SEEN / np.sqrt(12.0) * np.sqrt(len(gone) * len(c.linear)) / max(len(c.faults), 1)
     values = {p.name: fit.point.get(f"{effect}.{p.name}", p.neutral) for p in e.parameters}
     parameters = {}
     for p in e.parameters:
         name = f"{effect}.{p.name}"
         if name in bounds:
-            sd = float(np.linalg.norm([fit.sd[name], IMPLEMENTATION * values[p.name], FORM * rest * values[p.name]]))
+            parts = [fit.sd[name], IMPLEMENTATION * values[p.name], FORM * rest * values[p.name]]
+            sd = float(np.linalg.norm([*parts, small if p.unit == "1" and p.name in c.linear else 0.0]))
             f = bounds[name]
             parameters[p.name] = Quantity(
                 values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
