@@ -24,6 +24,7 @@ from .weak import Torque, bumps, lines
 
 FLAT, FLAT_SAMPLES = 5e-3, 10  # [A] samples of one cycle at the largest current that make a clipped top
 CLIPPED_STEP = 0.05  # [A] of the finite difference of a converter's limit
+SIZES = (0.5, 1.0, 2.0, 4.0)  # times the step of a probe: usual sizes of an effect
 WARMER = 3.0  # [K] spread of winding temperature below which nothing can be said about temperature
 
 
@@ -94,6 +95,14 @@ class Candidate:
             name: value for name, value in point.items() if name not in {f.name for f in self.frees}
         }
 
+    def sizes(self) -> list[Point]:
+        """Starts of the sizes that are usual, where one parameter tells the size."""
+        if len(self.linear) > 1:
+            return []
+        values = np.outer((-1.0, 1.0), np.array(SIZES) * self.amounts[0]).ravel()
+        low, high = self.limits()
+        return [self.start(np.array([x])) for x in values if low[0] <= x <= high[0]]
+
 
 @dataclass(frozen=True)
 class Seen(Candidate):
@@ -102,6 +111,10 @@ class Seen(Candidate):
     def start(self, values: Array) -> Point:
         """The probe."""
         return self.probes()[0]
+
+    def sizes(self) -> list[Point]:
+        """None but what is seen."""
+        return []
 
 
 @dataclass(frozen=True)
@@ -121,6 +134,10 @@ class Line(Candidate):
         """Sine and cosine of the line."""
         on = {f"{self.effect}.{n}": v for n, v in self.fixed.items()} | {f"{self.effect}.amplitude": self.steps[0]}
         return [{**on, f"{self.effect}.phase": 0.0}, {**on, f"{self.effect}.phase": 0.5 * np.pi}]
+
+    def sizes(self) -> list[Point]:
+        """None: a line begins with its phase."""
+        return []
 
     def limits(self) -> tuple[Array, Array]:
         """Of A cos φ and A sin φ."""

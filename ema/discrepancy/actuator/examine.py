@@ -116,18 +116,28 @@ def examine(
 
 
 def _faults_only(search: Search) -> tuple[Model, Verdict]:
-    """The model with faults alone: what they make of the noise weighs what tells them, so both are found in turn."""
-    model = start_model(search)
+    """The model with faults alone: what they make of the noise weighs what tells them, so both are found in turn.
+
+    Where that leads nowhere near the data, the faults found stand for something else, and the noise stays nominal.
+    """
+    model = nominal = start_model(search)
     if max(model.fit.point.get(name, 0.0) for name in FAULTS) < FAULT_ALARM:
         return model, search.verdict(model)
+    noise = search.noise
     while True:
         left = model.excess
         search.noise = Noise(search.plant, model.fit.point)
         model = search.model((), model.fit.free, model.fit.point, model.fit.columns, 1)
         v = search.verdict(model)
-        if v.is_noise or model.excess < NEARLY or model.excess > CLOSE * left:
+        if v.is_noise or model.excess < NEARLY:
             return model, v
+        if model.excess > CLOSE * left:
+            break
         model = search.model((), model.fit.free, model.fit.point, None, 6)
+    if model.excess < DISTANT:
+        return model, v
+    search.noise = noise
+    return nominal, search.verdict(nominal)
 
 
 def _grown(
@@ -138,7 +148,7 @@ def _grown(
     while not v.is_noise and len(after.effects) < MAX_EFFECTS:
         enough = bool(after.effects) and after.excess < ENOUGH * before.excess + SLACK
         models = search.extend(after)
-        needed = (STRONG if enough else WORTH_IT) * after.excess
+        needed = max(STRONG * after.excess, CHANCE) if enough else WORTH_IT * after.excess
         real = [
             m for m in models if after.excess - m.excess >= needed and _is_credible(m) and _does_it(search, m, after)
         ]
@@ -230,7 +240,7 @@ def _without_superfluous(
 
 def _settled(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     """`model` with faults and effects told apart that look nearly the same, as far as the record allows."""
-    if not model.effects:
+    if not model.effects or model.excess > DISTANT:
         return model, v
     found = search.settled(model)
     return (model, v) if found.heldout > model.heldout + CHANCE else (found, search.verdict(found))

@@ -1,16 +1,17 @@
 """Directions of faults and effects together that a record hardly feels, as a weaker magnet less three shorts.
 
 The Jacobian's columns are differences of simulated means over steps of a few hundredths. Where long columns nearly
-cancel, their difference is noise and curvature. What is left of the direction itself is stick, slip and switching that
-shift in time: felt over short steps, and on the side where the truth lies. So such a direction is simulated itself, to
-both sides, over shorter and shorter steps, and twice with other seeds: the product of two halves has no share of noise.
-Where the last turns wander still, their mean is taken, and their scatter is part of the deviations.
+cancel, their difference is noise and curvature: even the direction in which they cancel is not known. So the flat
+directions are simulated themselves, to both sides, as far as that is clearly felt; the Jacobian learns what that shows
+[Broyden, Math. Comp. 19, 1965] and so which directions are flat; and so on from where a step leads. All is simulated
+twice with other seeds: the product of two halves has no share of noise. The scatter of the last turns is part of the
+deviations.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,70 +20,120 @@ from .fit import Fit, Free, bounded, bounds, concluded, moved, residuals_at, sta
 from .noise import Noise
 from .plant import EmaPlant, Point
 
-FLAT = 0.2  # length of a direction over that of the longest, below which it is simulated itself
-N_SEEDS = 12  # at least, of each half
+FLAT = 0.3  # length of a direction over that of the longest, below which it is simulated itself
+N_SEEDS = 8  # at least, of each half
 SEEDS = 4_000_000, 5_000_000
-REACHES = (1.0, 0.3, 0.1)  # steps of the finite differences, to each side
+FELT = 60.0  # by how much the whitened features are to differ at either end of a direction
+N_STEPS = 2.0  # of finite differences, that no parameter is moved beyond
 N_TURNS = 8  # at most
-ARRIVED = 0.5  # share of a reach that a turn may still go, to look closer
-CLEAR = 4.0  # times its noise: information of a direction, below which steps are not made shorter
+ARRIVED = 0.25  # share of the way between the ends that a turn may still go along flat directions
+N_LAST = 3  # turns there whose mean is taken
+HARDLY = 0.2  # of FELT, by which a bound may bend a way
+UNSEEN = 0.12  # of the noise of a cycle: by how much honest simulations of the same laws differ along a flat direction
+ONE_SIDED = 0.15  # share of a way inside bounds, below which the point itself is the end
+
+
+@dataclass(frozen=True)
+class Probed:
+    """The Jacobian by each half of the seeds, (n_features, n_free), in units of the scaled parameters.
+
+    `of_noise` is what noise makes of the information of a flat direction.
+    """
+
+    halves: tuple[Array, Array]
+    of_noise: float
+
+    @property
+    def J(self) -> Array:
+        """By all seeds."""
+        return 0.5 * (self.halves[0] + self.halves[1])
 
 
 def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> Fit:
     """`fit` brought to its minimum along flat directions too, with deviations that hold there; itself without any."""
     J = stacked_jacobian(noise, fit.free, fit.columns, cycles)
     scale = np.linalg.norm(J, axis=0)
-    if not scale.all():
+    if not scale.all() or not len(_flat(J := J / scale, FLAT)[0]):
         return fit
-    U, length, V = np.linalg.svd(J / scale, full_matrices=False)
-    n = int(np.sum(length > FLAT * length[0]))
-    if n == len(length):
-        return fit
-    U, steep, flat = U[:, :n], length[:n, None] * V[:n] * scale, V[n:] * scale
     n_seeds = plant.n_seeds(cycles, N_SEEDS)
     point: Point = fit.point
-    solution = np.empty((0, 0))
-    reaches = list(REACHES)
     last: list[Point] = []
-    for _ in range(N_TURNS):
+    for turn in range(N_TURNS):
+        reaches, directions = _flat(J, FLAT if turn else np.inf)  # first all: no difference is above suspicion
         ends = [
-            (_towards(fit.free, point, -reaches[0], v), _towards(fit.free, point, reaches[0], v))
-            for v in flat / scale**2
+            [_towards(fit.free, point, sign * reach * v, scale) for sign in (1.0, -1.0)]
+            for reach, v in zip(reaches, directions, strict=True)
         ]
-        ways = np.array([v @ _difference(fit.free, *pair) for v, pair in zip(flat, ends, strict=True)])
-        if not (ways > 0.0).all():
-            return fit
+        ends = [pair for pair in ends if pair[0] != pair[1]]
+        if not ends:
+            break
+        ways = scale * np.array([_difference(fit.free, *pair) for pair in ends])
         here, *there = _halves(plant, noise, [point, *(p for pair in ends for p in pair)], cycles, n_seeds)
-        system, known, rows = [steep], [U.T @ here.mean(axis=0)], [U.T]
-        is_clear = True
-        for v, way, low, high in zip(flat, ways, there[::2], there[1::2], strict=True):
-            c = (low - high) / way
-            system[0] = system[0] + np.outer(U.T @ c.mean(axis=0), v)
-            c -= c @ U @ U.T
-            of_noise = float(np.sqrt(c.shape[1])) * 2.0 / n_seeds / way**2
-            information = max(float(c[0] @ c[1]), of_noise)
-            is_clear &= information >= CLEAR * of_noise
-            system.append(np.sqrt(information) * v[None])
-            known.append(np.array([0.5 * (c[0] @ here[1] + c[1] @ here[0]) / np.sqrt(information)]))
-            rows.append(c.mean(axis=0, keepdims=True) / np.sqrt(information))
-        if solution.size and not is_clear:
-            break
-        A = np.concatenate(system)
-        step, _ = bounded(A, np.concatenate(known), *bounds(fit.free, point))
+        probed = _learnt(J, ways, np.array(there[1::2]) - np.array(there[::2]), n_seeds)
+        J = probed.J
+        A, known, rows = _system(probed, here)
+        step, _ = bounded(A * scale, known, *bounds(fit.free, point))
         point = moved(point, fit.free, step)
-        solution = np.linalg.solve(A, np.concatenate(rows))
-        last += [point] if len(reaches) == 1 else []
-        if (np.abs(flat @ step) < ARRIVED * 0.5 * ways).all():
-            del reaches[0]
-        if not reaches:
+        solution = np.linalg.solve(A * scale, rows)
+        if (np.abs(ways @ (scale * step)) < ARRIVED * (ways**2).sum(axis=1)).all():
+            last.append(point)
+        if len(last) == N_LAST:
             break
-    else:
-        point = {name: float(np.mean([p[name] for p in last])) for name in point} if last else point
+    last = last or [point]
+    point = {name: float(np.mean([p[name] for p in last])) for name in point}
     left = {c: x.mean(axis=0) for c, x in _by_cycle(plant, noise, [point], cycles, n_seeds)[0].items()}
     parts = np.split(solution, np.cumsum([len(left[c]) for c in cycles])[:-1], axis=1)
     found = concluded(plant, noise, fit.free, point, fit.columns, left, parts, 0.5 / n_seeds)
-    sd = {name: float(np.hypot(x, np.std([p[name] for p in last or [point]]))) for name, x in found.sd.items()}
+    unseen = UNSEEN**2 * sum(float((noise.of(c).fresh ** 2).sum(axis=1).mean()) for c in cycles)
+    n_flat = len(_flat(J, FLAT)[0])
+    along = np.linalg.inv(A * scale)[:, len(A) - n_flat :]
+    more = unseen * (along**2).sum(axis=1)
+    sd = {
+        name: float(np.linalg.norm([x, np.sqrt(extra), np.std([p[name] for p in last])]))
+        for (name, x), extra in zip(found.sd.items(), more, strict=True)
+    }
     return replace(found, sd=sd)
+
+
+def _flat(J: Array, flat: float) -> tuple[Array, Array]:
+    """How far to go for features to differ by FELT, (n_flat,), and the flat directions, (n_flat, n_free)."""
+    _, length, V = np.linalg.svd(J, full_matrices=False)
+    is_flat = length < flat * length[0]
+    return FELT / length[is_flat], V[is_flat]
+
+
+def _learnt(J: Array, ways: Array, found: Array, n_seeds: int) -> Probed:
+    """The Jacobian that agrees with what was found.
+
+    Parameters
+    ----------
+    ways : array, shape (n_flat, n_free)
+    found : array, shape (n_flat, 2, n_features)
+        What the features differ by from end to end of each way, by half of the seeds.
+    """
+    back = np.linalg.pinv(ways, rcond=0.1)
+    first, second = (J + (back @ (found[:, half] - ways @ J.T)).T for half in (0, 1))
+    shortest = float((ways**2).sum(axis=1).min())
+    return Probed((first, second), float(np.sqrt(len(J))) * 2.0 / n_seeds / shortest)
+
+
+def _system(probed: Probed, r: Array) -> tuple[Array, Array, Array]:
+    """Equations A x = known of a step, and the rows that make `known` of whitened features.
+
+    Steep directions are taken by the Jacobian, flat ones by the product of its halves.
+    """
+    U, length, V = np.linalg.svd(probed.J, full_matrices=False)
+    n = int(np.sum(length >= FLAT * length[0]))
+    U = U[:, :n]
+    first, second = (C - U @ (U.T @ C) for C in (half @ V[n:].T for half in probed.halves))
+    F = first.T @ second
+    information, Q = np.linalg.eigh(0.5 * (F + F.T))
+    root = np.sqrt(np.maximum(information, probed.of_noise))[:, None]
+    g = 0.5 * (first.T @ r[1] + second.T @ r[0])
+    A = np.concatenate([length[:n, None] * V[:n], root * (Q.T @ V[n:])])
+    known = np.concatenate([U.T @ r.mean(axis=0), (Q.T @ g) / root[:, 0]])
+    rows = np.concatenate([U.T, Q.T @ (0.5 * (first + second)).T / root])
+    return A, known, rows
 
 
 def _by_cycle(
@@ -99,11 +150,18 @@ def _halves(plant: EmaPlant, noise: Noise, points: Sequence[Point], cycles: Sequ
     return [np.concatenate([at[c] for c in cycles], axis=1) for at in found]
 
 
-def _difference(frees: Sequence[Free], low: Point, high: Point) -> Array:
-    return np.array([high[f.name] - low[f.name] for f in frees])
+def _difference(frees: Sequence[Free], high: Point, low: Point) -> Array:
+    return np.array([high.get(f.name, 0.0) - low.get(f.name, 0.0) for f in frees])
 
 
-def _towards(frees: Sequence[Free], point: Point, reach: float, along: Array) -> Point:
-    """The point as many steps of finite differences along a direction, inside bounds."""
-    amount = reach * float(np.min([abs(f.step) for f in frees] / np.abs(along)))
-    return moved(point, frees, np.clip(amount * along, *bounds(frees, point)))
+def _towards(frees: Sequence[Free], point: Point, way: Array, scale: Array) -> Point:
+    """The point as far along a way (scaled) as bounds allow, but for what is hardly felt when cut off."""
+    low, high = (edge * scale for edge in bounds(frees, point))
+    share = min(1.0, N_STEPS * float(np.min([abs(f.step) for f in frees] * scale / np.abs(way))))
+    over = np.abs(way) > 0.0
+    room = (np.where(way > 0.0, high, -low) + HARDLY * FELT)[over] / np.abs(way)[over]
+    share = min(share, float(room.min()))
+    if share < ONE_SIDED:
+        return point
+    ends = zip(frees, share * way / scale, strict=True)
+    return {**point, **{f.name: float(np.clip(point.get(f.name, 0.0) + d, f.low, f.high)) for f, d in ends}}

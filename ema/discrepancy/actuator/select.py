@@ -311,14 +311,20 @@ class Search:
         """Candidates by what their starts leave when simulated: far from the data first order promises little."""
         motions = self.plant.data.motion
         cycles = [next(c for c in self.train if motions[c] == m) for m in sorted({int(motions[c]) for c in self.train})]
-        share = len(self.train) / len(cycles)
-        alone = self._starts_with(model, [s.candidate for s in screened], dict.fromkeys(FAULTS, 0.0))
-        starts = [point for s, other in zip(screened, alone, strict=True) for point in (s.start, other)]
-        costs = self._costs(starts, cycles, (DT_PROBE,))
+        none = dict.fromkeys(FAULTS, 0.0)
+        alone = self._starts_with(model, [s.candidate for s in screened], none)
+        starts = [
+            [s.start, other, *({**model.fit.point, **none, **size} for size in s.candidate.sizes())]
+            for s, other in zip(screened, alone, strict=True)
+        ]
+        points = [point for of in starts for point in of]
+        here, *there = self._costs([model.fit.point, *points], cycles, typical=True, steps=(DT_PROBE,))
+        cost = sum(float(r @ r) for r in model.fit.residuals.values())
+        costs = iter(there)
         ranked = []
-        for j, s in enumerate(screened):
-            cost, best = min((costs[at], at) for at in (2 * j, 2 * j + 1))
-            ranked.append(Screened(share * cost, s.candidate, starts[best]))
+        for s, of in zip(screened, starts, strict=True):
+            least, best = min((next(costs), at) for at in range(len(of)))
+            ranked.append(Screened(cost * least / here, s.candidate, of[best]))
         return sorted(ranked, key=lambda entry: entry.promised)
 
     def _close(self, refined: dict[str, Model]) -> list[tuple[str, Model]]:
@@ -330,7 +336,7 @@ class Search:
 
     def _refined(self, model: Model, s: Screened) -> Model:
         frees = (*model.fit.free, *s.candidate.frees)
-        start, cost = self._better([s.start, self.start_with(model, s.candidate, dict.fromkeys(FAULTS, 0.0))])
+        start, cost = self._better([s.start, self.start_with(model, s.candidate, dict.fromkeys(FAULTS, 0.0))], model)
         if self._stands_for_faults(model, s.candidate):
             # One effect for several faults, or for what they have in common, is the simpler cause; noise in the
             # columns would leave the faults there.
@@ -338,7 +344,7 @@ class Search:
             k = model.fit.point
             common = min(k[name] for name in faults)
             less = (dict.fromkeys(faults, 0.0), {name: k[name] - common for name in faults})
-            simpler, simpler_cost = self._better([self._alone(model, s.candidate, rest) for rest in less])
+            simpler, simpler_cost = self._better([self._alone(model, s.candidate, rest) for rest in less], model)
             if simpler_cost < NO_WORSE * cost:
                 start = simpler
         return self.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3)
@@ -358,16 +364,30 @@ class Search:
         n = sum(len(self.plant.data.y[c]) for c in self.train)
         return promised / n > 3.0 * min(m.fit.misfit for m in refined.values()) + 0.5
 
-    def _better(self, starts: Sequence[Point]) -> tuple[Point, float]:
-        """The start that simulates closest to the training cycles, and its squared residual."""
-        costs = self._costs(starts, self.train)
+    def _better(self, starts: Sequence[Point], model: Model) -> tuple[Point, float]:
+        """The start that simulates closest to the training cycles, and its cost."""
+        costs = self._costs(starts, self.train, typical=model.excess > FAR)
         best = int(np.argmin(costs))
         return starts[best], costs[best]
 
-    def _costs(self, points: Sequence[Point], cycles: Sequence[int], steps: Steps = None) -> list[float]:
-        """Squared residual of some cycles at several points, at a glance."""
+    def _costs(
+        self, points: Sequence[Point], cycles: Sequence[int], *, typical: bool, steps: Steps = None
+    ) -> list[float]:
+        """Squared residual of some cycles at several points, at a glance.
+
+        The typical one is a geometric mean over cycles and groups of features: far from the data a single one, where
+        noise happens to be least, would decide what is nearer.
+        """
         left = residuals_at(self.plant, self.noise, points, cycles, N_GLANCE, SEED, steps)
-        return [sum(float(r @ r) for r in at.values()) for at in left]
+        return [self._typical(at) if typical else sum(float(r @ r) for r in at.values()) for at in left]
+
+    def _typical(self, left: dict[int, Array]) -> float:
+        n, total = 0, 0.0
+        for cycle, r in left.items():
+            for at in self.plant.slices[int(self.plant.data.motion[cycle])].values():
+                n += len(r[at])
+                total += len(r[at]) * float(np.log1p(np.mean(r[at] ** 2)))
+        return n * float(np.expm1(total / n))
 
 
 def _stripped(model: Model, effect: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:
