@@ -40,6 +40,7 @@ CHANCE = 0.03  # difference in misfit that seeds make
 SURE = 0.1  # gain in misfit from which an effect is preferred to faults that explain a record just as simply
 SAME = 0.05  # difference in held-out misfit up to which fewer causes are preferred
 NEARLY = 0.5  # excess of a model that may be the right one but for switching
+NEAR, N_OWN = 1.0, 3  # excess up to which so many models are weighed by noise of their own
 SLACK = 0.1  # misfit that switching noise may make
 ENVELOPE_SETTLING = 15e-3  # [s]
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
@@ -153,6 +154,8 @@ def _grown(
             m for m in models if after.excess - m.excess >= needed and _is_credible(m) and _does_it(search, m, after)
         ]
         if not real:
+            real = _with_own_noise(search, [m for m in models if m.heldout < after.heldout + SAME], after)
+        if not real:
             break
         best = real[0]
         alike.append(tuple(m.names[-1] for m in real[1:] if m.heldout - best.heldout < ALIKE * best.excess + CHANCE))
@@ -166,6 +169,26 @@ def _grown(
             after, v = _settled(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
+
+
+def _with_own_noise(search: Search, models: list[Model], after: Model) -> list[Model]:
+    """Of the likeliest models those that do better, when noise is estimated where they are, best first.
+
+    What runs differ by depends on the point. Where faults stand for an effect, the noise there hides what the true
+    model gains; so either is weighed by its own, and must do better by that of both.
+    """
+    if after.excess > NEAR:
+        return []
+    here, found = search.noise, []
+    for m in models[:N_OWN]:
+        search.noise = Noise(search.plant, m.fit.point)
+        m = search.model(m.effects, m.fit.free, m.fit.point, m.fit.columns, 2)
+        less = -search.left_more(m, after, (here, search.noise))
+        if m.excess < CLOSE * after.excess and less > CHANCE and _is_credible(m):
+            found.append((m, search.noise))
+    found.sort(key=lambda entry: entry[0].heldout)
+    search.noise = found[0][1] if found else here
+    return [m for m, _ in found]
 
 
 def _surely(search: Search, model: Model, v: Verdict, conditions: list[str]) -> tuple[Model, Verdict]:
@@ -307,7 +330,7 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
     if not search.plant.data.has_temperature:
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
     kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c not in odd]
-    rest = 0.0 if v.is_noise else float(np.sqrt(left))
+    rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
     found = [_found(search, after, c.effect, a, rest) for c, a in kept]
     if too_little and found:
         notes.append(
@@ -333,6 +356,11 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
     ]
     unnamed = [_found(search, after, c.effect, (), rest, "torque_line") for c in odd]
     return Findings(verdict, found, _gain(search, before, after), shape, tried, notes, unnamed=unnamed)
+
+
+def _left_in_training(before: Model, after: Model) -> float:
+    """Share of what there was beyond noise in training cycles that is left."""
+    return max(after.fit.misfit - 1.0, 0.0) / max(before.fit.misfit - 1.0, 1e-9)
 
 
 def _with_function(search: Search, findings: Findings, before: Model, after: Model) -> tuple[Findings, Model]:
