@@ -66,6 +66,8 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
         ]
         ends = [pair for pair in ends if pair[0] != pair[1]]
         if not ends:
+            if turn == 0:
+                return fit
             break
         ways = scale * np.array([_difference(fit.free, *pair) for pair in ends])
         here, *there = _halves(plant, noise, [point, *(p for pair in ends for p in pair)], cycles, n_seeds)
@@ -84,15 +86,16 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
     left = {c: x.mean(axis=0) for c, x in _by_cycle(plant, noise, [point], cycles, n_seeds)[0].items()}
     parts = np.split(solution, np.cumsum([len(left[c]) for c in cycles])[:-1], axis=1)
     found = concluded(plant, noise, fit.free, point, fit.columns, left, parts, 0.5 / n_seeds)
-    unseen = UNSEEN**2 * sum(float((noise.of(c).fresh ** 2).sum(axis=1).mean()) for c in cycles)
-    n_flat = len(_flat(J, FLAT)[0])
-    along = np.linalg.inv(A * scale)[:, len(A) - n_flat :]
-    more = unseen * (along**2).sum(axis=1)
-    sd = {
-        name: float(np.linalg.norm([x, np.sqrt(extra), np.std([p[name] for p in last])]))
-        for (name, x), extra in zip(found.sd.items(), more, strict=True)
-    }
-    return replace(found, sd=sd)
+    wandered = np.array([np.std([p[f.name] for p in last]) for f in fit.free])
+    more = np.hypot(wandered, _unseen(noise, A * scale, len(_flat(J, FLAT)[0]), cycles))
+    return replace(found, sd={name: float(np.hypot(x, y)) for (name, x), y in zip(found.sd.items(), more, strict=True)})
+
+
+def _unseen(noise: Noise, A: Array, n_flat: int, cycles: Sequence[int]) -> Array:
+    """What a difference between honest simulations makes of each parameter, along flat directions (the last of A)."""
+    of_noise = sum(float((noise.of(c).fresh ** 2).sum(axis=1).mean()) for c in cycles)
+    along = np.linalg.inv(A)[:, len(A) - n_flat :]
+    return np.asarray(UNSEEN * np.sqrt(of_noise * (along**2).sum(axis=1)))
 
 
 def _flat(J: Array, flat: float) -> tuple[Array, Array]:
