@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from ema import faults
 from ema.core.errors import ConfigError
@@ -177,27 +178,30 @@ def simulate(
         raise ConfigError(f"step {dt:g} s does not divide the control period {T:g} s")
     command = plant.command() if command is None else np.asarray(command, dtype=float)
     command = np.broadcast_to(np.atleast_2d(command), (n, np.shape(command)[-1]))
-    n_times = command.shape[1]
+    n_recorded = command.shape[1]
     start = cold_start(plant, n) if start is None else np.broadcast_to(np.atleast_2d(start), (n, N_STATE))
     seeds = np.broadcast_to(np.asarray(seeds), (n,))
 
     z = parameters(plant, k, merged, dT)
     extended = bool(merged) + any(registry()[name].is_table for name in merged)
     z[:N_STATE] = start.T
+    shared = z[row("clock_skew.shared")].copy()  # batches write to z
+    skew = z[row("clock_skew.rate")]
+    n_times = n_recorded + int(np.ceil(max(float(skew.max()), 0.0) * n_recorded))
+    command = np.concatenate([command, np.repeat(command[:, -1:], n_times - n_recorded, axis=1)], axis=1)
     lvdt_noise = np.zeros((n, n_times))
-    current_noise = np.zeros((n, 3, n_times))
+    current_noise = np.zeros((n, 3, n_recorded))
     if noise:
         for run, seed in enumerate(seeds):
             rng = np.random.default_rng(int(seed))
-            lvdt_noise[run] = plant.sensors.lvdt_noise * rng.standard_normal(n_times)
-            current_noise[run] = plant.sensors.current_noise * rng.standard_normal((3, n_times))
+            lvdt_noise[run, :n_recorded] = plant.sensors.lvdt_noise * rng.standard_normal(n_recorded)
+            current_noise[run] = plant.sensors.current_noise * rng.standard_normal((3, n_recorded))
 
     n_lanes = 1 if n == 1 else N_LANES
     out = np.empty((n, len(OUTPUTS), n_times))
 
-    def batch(first: int) -> None:
-        lanes = np.minimum(np.arange(first, first + n_lanes), n - 1)  # the last run fills up the last batch
-        used = min(n_lanes, n - first)
+    def batch(runs: np.ndarray) -> None:
+        lanes = np.concatenate([runs, np.repeat(runs[-1:], n_lanes - len(runs))])  # the last run fills up the batch
         zb = np.ascontiguousarray(z[:, lanes]).ravel()
         ob = np.empty((len(OUTPUTS), n_times, n_lanes))
         history = np.zeros((2, N_RING, n_lanes))
@@ -207,28 +211,28 @@ def simulate(
             np.ascontiguousarray(lvdt_noise[lanes].T),
             ob,
             history,
-            dt,
+            dt * (1.0 + shared[runs[0]]),
             n_substeps,
             (0,) * n_lanes,
             (0,) * extended,
             (0,) * audited,
         )
-        z[:, first : first + used] = zb.reshape(N_ROWS, n_lanes)[:, :used]
-        out[first : first + used] = ob.transpose(2, 0, 1)[:used]
+        z[:, runs] = zb.reshape(N_ROWS, n_lanes)[:, : len(runs)]
+        out[runs] = ob.transpose(2, 0, 1)[: len(runs)]
 
-    firsts = range(0, n, n_lanes)
-    if n_threads > 1 and len(firsts) > 1:
+    alike = [np.flatnonzero(shared == s) for s in np.unique(shared)]  # lanes take steps of one length
+    batches = [runs[first : first + n_lanes] for runs in alike for first in range(0, len(runs), n_lanes)]
+    if n_threads > 1 and len(batches) > 1:
         with ThreadPoolExecutor(n_threads) as pool:
-            list(pool.map(batch, firsts))
+            list(pool.map(batch, batches))
     else:
-        for first in firsts:
-            batch(first)
+        for runs in batches:
+            batch(runs)
 
     t = np.arange(n_times) * T
-    skew = np.broadcast_to(z[row("clock_skew.rate")], (n,))
-    if skew.any():
-        for run in map(int, np.flatnonzero(skew)):
-            out[run] = [np.interp(t * (1.0 + skew[run]), t, channel) for channel in out[run]]
+    for run in map(int, np.flatnonzero(skew)):
+        out[run] = CubicSpline(t, out[run], axis=1)(t * (1.0 + skew[run]))
+    t, out = t[:n_recorded], out[..., :n_recorded]
     i = out[:, :3] + current_noise
     if noise:
         limit = np.minimum(z[row("adc_saturation.limit")], plant.sensors.adc_range)[:, None, None]

@@ -57,7 +57,8 @@ class Candidate:
     @property
     def key(self) -> str:
         """Distinct for candidates with other probes."""
-        return self.effect + "".join(f" {name}={value:.4g}" for name, value in sorted(self.fixed.items()))
+        of = f"{self.effect} {' '.join(self.linear)}"
+        return of + "".join(f" {name}={value:.4g}" for name, value in sorted(self.fixed.items()))
 
     @property
     def amounts(self) -> Array:
@@ -170,6 +171,7 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque]) -> li
     found = [
         _plain("asymmetric_friction", "asymmetry"),
         _plain("clock_skew", "rate", step={"rate": 1e-4}),
+        _plain("clock_skew", "shared", step={"shared": 5e-4}),
         _plain("commutation_offset", "angle"),
         _plain("constant_load", "torque"),
         _plain("current_gain", "gain_a", "gain_b", "gain_c", step=dict.fromkeys(("gain_a", "gain_b", "gain_c"), 0.02)),
