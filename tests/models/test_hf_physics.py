@@ -195,3 +195,21 @@ def test_a_start_off_the_command_is_at_rest_with_its_holding_current(offset):
     assert np.ptp(r.theta_m) < PLANT.transmission.GR * PLANT.sensors.lvdt_step  # ripple may make it creep
     x = 0.5 * np.abs(r.i[0]).sum(axis=0)
     assert x[:30].mean() == pytest.approx(x[300:].mean(), abs=0.08)
+
+
+def test_a_clock_that_is_slow_is_a_slower_controller():
+    slow = 0.004
+    plant = varied(control={"rate": PLANT.control.rate / (1.0 + slow)})
+    shared = runs(effects={"clock_skew": {"shared": slow}}, noise=False)
+    slower = runs(plant=plant, command=PLANT.command(), dt=hf.DT * (1.0 + slow), noise=False)
+    np.testing.assert_allclose(shared.theta_u, slower.theta_u, rtol=1e-9)
+    np.testing.assert_allclose(shared.i, slower.i, atol=1e-6)
+
+
+def test_a_slow_recorder_sees_the_motion_early_to_the_end(nominal):
+    late = 0.004
+    recorded = runs(effects={"clock_skew": {"rate": late}}, noise=False)
+    t = nominal.t
+    longer = runs(command=np.append(PLANT.command(), np.full(50, PLANT.command()[-1])), noise=False)
+    seen = np.interp(t * (1.0 + late), longer.t, longer.theta_m[0])
+    assert np.abs(recorded.theta_m[0] - seen).max() < 1e-4 * np.ptp(seen)
