@@ -41,6 +41,7 @@ SURE = 0.1  # gain in misfit from which an effect is preferred to faults that ex
 SAME = 0.05  # difference in held-out misfit up to which fewer causes are preferred
 NEARLY = 0.5  # excess of a model that may be the right one but for switching
 NEAR, N_OWN = 1.0, 3  # excess up to which so many models are weighed by noise of their own
+DOUBTFUL = 2.0  # deviations from nothing, below which an effect is not named
 SLACK = 0.1  # misfit that switching noise may make
 ENVELOPE_SETTLING = 15e-3  # [s]
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
@@ -108,6 +109,7 @@ def examine(
     after, v = _without_superfluous(search, after, v, alike)
     if after is not settled:
         after, v = _settled(search, after, v)
+    after, v = _without_doubtful(search, after, v, alike)
     alike = [_still_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
     findings = _findings(search, before, after, v, alike)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
@@ -122,8 +124,9 @@ def _faults_only(search: Search) -> tuple[Model, Verdict]:
     Where that leads nowhere near the data, the faults found stand for something else, and the noise stays nominal.
     """
     model = nominal = start_model(search)
-    if max(model.fit.point.get(name, 0.0) for name in FAULTS) < FAULT_ALARM:
-        return model, search.verdict(model)
+    v = search.verdict(model)
+    if v.is_noise and max(model.fit.point.get(name, 0.0) for name in FAULTS) < FAULT_ALARM:
+        return model, v
     noise = search.noise
     while True:
         left = model.excess
@@ -258,6 +261,21 @@ def _without_superfluous(
                 del alike[model.effects.index(effect)]
                 model, v = reduced, search.verdict(reduced)
                 search.say(f"{effect.effect} is superfluous: p = {v.p_value:.2g}")
+    return model, v
+
+
+def _without_doubtful(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+    """`model` without the effects whose intervals hold nothing at all: they have only led the fit there."""
+    for effect in model.effects:
+        names = [f"{effect.effect}.{name}" for name in effect.linear]
+        away = (
+            abs(model.fit.point[name] - search.plant.neutral(name)) / max(model.fit.sd[name], 1e-300) for name in names
+        )
+        if max(away) < DOUBTFUL:
+            del alike[model.effects.index(effect)]
+            model = search.without(model, effect)
+            v = search.verdict(model)
+            search.say(f"{effect.effect} may be nothing: p = {v.p_value:.2g}")
     return model, v
 
 
