@@ -161,7 +161,7 @@ def _grown(
         if not real:
             break
         best = real[0]
-        alike.append(tuple(m.names[-1] for m in real[1:] if m.heldout - best.heldout < ALIKE * best.excess + CHANCE))
+        alike.append(tuple(m.names[-1] for m in real[1:] if _is_alike(m, best)))
         after = best
         if after.excess < NEW_NOISE * left:  # what runs differ by depends on the point, and so does every weight
             left = max(after.excess, CHANCE)
@@ -172,6 +172,11 @@ def _grown(
             after, v = _settled(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
+
+
+def _is_alike(model: Model, best: Model) -> bool:
+    """Whether a model leaves little more than the best, or nothing as well."""
+    return model.excess < CHANCE or model.heldout - best.heldout < ALIKE * best.excess + CHANCE
 
 
 def _with_own_noise(search: Search, models: list[Model], after: Model) -> list[Model]:
@@ -271,10 +276,12 @@ def _without_doubtful(search: Search, model: Model, v: Verdict, alike: list[tupl
         away = (
             abs(model.fit.point[name] - search.plant.neutral(name)) / max(model.fit.sd[name], 1e-300) for name in names
         )
-        if max(away) < DOUBTFUL:
+        if max(away) > DOUBTFUL:
+            continue
+        reduced = search.without(model, effect)  # parameters each in doubt may be sure together
+        if reduced.heldout < model.heldout + SAME:
             del alike[model.effects.index(effect)]
-            model = search.without(model, effect)
-            v = search.verdict(model)
+            model, v = reduced, search.verdict(reduced)
             search.say(f"{effect.effect} may be nothing: p = {v.p_value:.2g}")
     return model, v
 
