@@ -186,29 +186,30 @@ def simulate(
     extended = bool(merged) + any(registry()[name].is_table for name in merged)
     z[:N_STATE] = start.T
     shared = z[row("clock_skew.shared")].copy()  # batches write to z
-    skew = z[row("clock_skew.rate")]
-    n_times = n_recorded + int(np.ceil(max(float(skew.max()), 0.0) * n_recorded))
-    command = np.concatenate([command, np.repeat(command[:, -1:], n_times - n_recorded, axis=1)], axis=1)
-    lvdt_noise = np.zeros((n, n_times))
+    skew = z[row("clock_skew.rate")].copy()
+    beyond = np.ceil(np.maximum(skew, 0.0) * n_recorded).astype(int)  # samples that a slow recorder takes later
+    lvdt_noise = np.zeros((n, n_recorded))
     current_noise = np.zeros((n, 3, n_recorded))
     if noise:
         for run, seed in enumerate(seeds):
             rng = np.random.default_rng(int(seed))
-            lvdt_noise[run, :n_recorded] = plant.sensors.lvdt_noise * rng.standard_normal(n_recorded)
+            lvdt_noise[run] = plant.sensors.lvdt_noise * rng.standard_normal(n_recorded)
             current_noise[run] = plant.sensors.current_noise * rng.standard_normal((3, n_recorded))
 
     n_lanes = 1 if n == 1 else N_LANES
-    out = np.empty((n, len(OUTPUTS), n_times))
+    out = np.empty((n, len(OUTPUTS), n_recorded))
+    t = np.arange(n_recorded) * T
 
     def batch(runs: np.ndarray) -> None:
         lanes = np.concatenate([runs, np.repeat(runs[-1:], n_lanes - len(runs))])  # the last run fills up the batch
+        more = (0, 0), (0, beyond[runs[0]])
         zb = np.ascontiguousarray(z[:, lanes]).ravel()
-        ob = np.empty((len(OUTPUTS), n_times, n_lanes))
+        ob = np.empty((len(OUTPUTS), n_recorded + beyond[runs[0]], n_lanes))
         history = np.zeros((2, N_RING, n_lanes))
         integrate(
             zb,
-            np.ascontiguousarray(command[lanes].T),
-            np.ascontiguousarray(lvdt_noise[lanes].T),
+            np.ascontiguousarray(np.pad(command[lanes], more, mode="edge").T),
+            np.ascontiguousarray(np.pad(lvdt_noise[lanes], more).T),
             ob,
             history,
             dt * (1.0 + shared[runs[0]]),
@@ -218,9 +219,13 @@ def simulate(
             (0,) * audited,
         )
         z[:, runs] = zb.reshape(N_ROWS, n_lanes)[:, : len(runs)]
-        out[runs] = ob.transpose(2, 0, 1)[: len(runs)]
+        for run, channels in zip(runs, ob.transpose(2, 0, 1), strict=False):
+            if skew[run]:
+                channels = CubicSpline(np.arange(channels.shape[1]) * T, channels, axis=1)(t * (1.0 + skew[run]))
+            out[run] = channels
 
-    alike = [np.flatnonzero(shared == s) for s in np.unique(shared)]  # lanes take steps of one length
+    of, kinds = np.unique(np.stack([shared, beyond]), axis=1, return_inverse=True)
+    alike = [np.flatnonzero(kinds.ravel() == kind) for kind in range(of.shape[1])]  # as many steps of one length
     batches = [runs[first : first + n_lanes] for runs in alike for first in range(0, len(runs), n_lanes)]
     if n_threads > 1 and len(batches) > 1:
         with ThreadPoolExecutor(n_threads) as pool:
@@ -229,10 +234,6 @@ def simulate(
         for runs in batches:
             batch(runs)
 
-    t = np.arange(n_times) * T
-    for run in map(int, np.flatnonzero(skew)):
-        out[run] = CubicSpline(t, out[run], axis=1)(t * (1.0 + skew[run]))
-    t, out = t[:n_recorded], out[..., :n_recorded]
     i = out[:, :3] + current_noise
     if noise:
         limit = np.minimum(z[row("adc_saturation.limit")], plant.sensors.adc_range)[:, None, None]

@@ -213,3 +213,13 @@ def test_a_slow_recorder_sees_the_motion_early_to_the_end(nominal):
     longer = runs(command=np.append(PLANT.command(), np.full(50, PLANT.command()[-1])), noise=False)
     seen = np.interp(t * (1.0 + late), longer.t, longer.theta_m[0])
     assert np.abs(recorded.theta_m[0] - seen).max() < 1e-4 * np.ptp(seen)
+
+
+def test_a_run_does_not_mind_a_slow_recorder_beside_it():
+    def with_recorders(*rates: float) -> hf.Response:
+        return hf.simulate(PLANT, np.zeros((2, 6)), seeds=1, effects={"clock_skew": {"rate": np.array(rates)}})
+
+    beside, alone = with_recorders(0.0, 0.004), with_recorders(0.0, 0.0)
+    assert np.array_equal(beside.theta_m[0], alone.theta_m[0])
+    assert np.array_equal(beside.state[0], alone.state[0])
+    assert not np.array_equal(beside.theta_m[1], alone.theta_m[1])

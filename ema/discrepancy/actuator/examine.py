@@ -124,7 +124,7 @@ def _faults_only(search: Search) -> tuple[Model, Verdict]:
     Where that leads nowhere near the data, the faults found stand for something else, and the noise stays nominal.
     """
     model = nominal = start_model(search)
-    v = search.verdict(model)
+    v = verdict_nominal = search.verdict(model)
     if v.is_noise and max(model.fit.point.get(name, 0.0) for name in FAULTS) < FAULT_ALARM:
         return model, v
     noise = search.noise
@@ -141,7 +141,7 @@ def _faults_only(search: Search) -> tuple[Model, Verdict]:
     if model.excess < DISTANT:
         return model, v
     search.noise = noise
-    return nominal, search.verdict(nominal)
+    return nominal, verdict_nominal
 
 
 def _grown(
