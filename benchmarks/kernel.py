@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ema.core import config, resources
+from ema.effects import registry
 from ema.models import hf, lf1
 from ema.models.actuator import Actuator
 
@@ -31,16 +32,25 @@ def _best(work: Callable[[], Any], n: int = 5) -> float:
     return best
 
 
+def _sixteen(plant: Actuator, effects: hf.Effects | None = None) -> float:
+    """Processor time of one run of sixteen. [s]"""
+    return _best(lambda: hf.simulate(plant, np.zeros((16, 6)), seeds=SEED + np.arange(16), effects=effects)) / 16
+
+
 def rows() -> list[dict[str, Any]]:
     plant = config.load(resources.config("actuator.yaml"), Actuator)
     steps = (plant.n_samples - 1) * round(1.0 / (plant.control.rate * hf.DT))
     duration = plant.motion.duration
     single = _best(lambda: hf.simulate(plant, np.zeros((1, 6)), seeds=SEED))
-    lanes = _best(lambda: hf.simulate(plant, np.zeros((16, 6)), seeds=SEED + np.arange(16))) / 16
+    effects = {e.name: {p.name: p.start for p in e.parameters} for e in registry().values() if "ema" in e.plants}
+    lanes, dragged = _sixteen(plant), _sixteen(plant, {"viscous_drag": effects["viscous_drag"]})
+    library = _sixteen(plant, effects)
     simplified = _best(lambda: lf1.simulate(plant, np.zeros((16, 6)))) / 16
     found = [
         ("HF, one run", 1e9 * single / steps, "ns of CPU/step", BEST_SINGLE, False),
         ("HF, 16 runs as lanes", 1e9 * lanes / steps, "ns of CPU/step/run", BEST_LANES, False),
+        ("HF, 16 runs as lanes, with viscous drag", 1e9 * dragged / steps, "ns of CPU/step/run", None, False),
+        ("HF, 16 runs as lanes, all effects at once", 1e9 * library / steps, "ns of CPU/step/run", None, False),
         ("HF, 16 runs as lanes", duration / lanes, "× real time per core", hf.DT / (1e-9 * BEST_LANES), True),
         ("Gauss-Newton step with HF (base, 6 columns, 9 seeds)", 16 * lanes, "s of CPU", None, False),
         ("LF1, 16 runs as lanes", 1e3 * simplified, "ms of CPU/run", None, False),

@@ -18,9 +18,9 @@ inductance_factor     i_j [A]                                                   
 angle_error           θ_m [rad]                                                  sum, on the resolver    0 rad
 ====================  =========================================================  ======================  ========
 
-ΔT is the winding temperature less 20 °C. A tabulated torque is a shaft torque that costs so much (a fifth of a step)
-that it is compiled in only for runs that have one. An effect without laws is *structural*: the model itself reads its
-parameters (a delay, a dead time, a second inertia).
+ΔT is the winding temperature less 20 °C. A tabulated torque is a shaft torque that costs a fifth of a step.
+A kernel is compiled with those parts of the library only that its runs need (`ema.models.parts`). An effect without
+laws is *structural*: the model itself reads its parameters (a delay, a dead time, a second inertia).
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -14,6 +15,7 @@ from ema.core.errors import ConfigError
 from ema.effects import registry
 from ema.effects.trapezoid import sector, six_step
 
+from . import parts
 from .actuator import Actuator
 from .envelope import envelope
 from .hf_kernel import OUTPUTS, integrate
@@ -183,7 +185,7 @@ def simulate(
     seeds = np.broadcast_to(np.asarray(seeds), (n,))
 
     z = parameters(plant, k, merged, dT)
-    extended = bool(merged) + any(registry()[name].is_table for name in merged)
+    active = np.array([_is_active(z, name) for name in merged]).reshape(len(merged), n)
     z[:N_STATE] = start.T
     shared = z[row("clock_skew.shared")].copy()  # batches write to z
     skew = z[row("clock_skew.rate")].copy()
@@ -215,7 +217,7 @@ def simulate(
             dt * (1.0 + shared[runs[0]]),
             n_substeps,
             (0,) * n_lanes,
-            (0,) * extended,
+            (0,) * parts.needed(list(compress(merged, active[:, runs[0]]))),
             (0,) * audited,
         )
         z[:, runs] = zb.reshape(N_ROWS, n_lanes)[:, : len(runs)]
@@ -224,8 +226,8 @@ def simulate(
                 channels = CubicSpline(np.arange(channels.shape[1]) * T, channels, axis=1)(t * (1.0 + skew[run]))
             out[run] = channels
 
-    of, kinds = np.unique(np.stack([shared, beyond]), axis=1, return_inverse=True)
-    alike = [np.flatnonzero(kinds.ravel() == kind) for kind in range(of.shape[1])]  # as many steps of one length
+    of, kinds = np.unique(np.stack([shared, beyond, *active]), axis=1, return_inverse=True)
+    alike = [np.flatnonzero(kinds.ravel() == kind) for kind in range(of.shape[1])]  # equations, steps, length of a step
     batches = [runs[first : first + n_lanes] for runs in alike for first in range(0, len(runs), n_lanes)]
     if n_threads > 1 and len(batches) > 1:
         with ThreadPoolExecutor(n_threads) as pool:
@@ -241,6 +243,11 @@ def simulate(
     channels = dict(zip(OUTPUTS[3:], out.transpose(1, 0, 2)[3:], strict=True))
     energy = {name: z[row(name)].copy() for name in ENERGIES} if audited else {}
     return Response(t=t, i=i, state=z[:N_STATE].T.copy(), energy=energy, **channels)
+
+
+def _is_active(z: np.ndarray, name: str) -> np.ndarray:
+    """Whether an effect does anything in each run, shape (n,)."""
+    return np.any([z[row(f"{name}.{p.name}")] != p.neutral for p in registry()[name].parameters], axis=0)
 
 
 def quantised(plant: Actuator, i: np.ndarray) -> np.ndarray:

@@ -2,8 +2,8 @@
 
 All lanes do the same operations (branches are selects), so the compiler turns the inner loop into vector instructions;
 a single run is a batch of one. The number of lanes and the variants are taken from the *lengths* of tuples, which the
-compiler knows: ``lanes`` (16 or 1), ``extended`` (1: with the library of effects, 2: and with tables of torque),
-``audited`` (1: with energy sums).
+compiler knows: ``lanes`` (16 or 1), ``parts`` (the sum of the parts of the library of effects that are compiled in, see
+`ema.models.parts`), ``audited`` (1: with energy sums).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from . import (
     jit,  # noqa: F401 - sets where kernels are cached
 )
 from .layout import row
+from .parts import FRICTION, GEAR, INVERTER, MOTOR, SENSORS, TABLES, TORQUE
 
 I_A, I_B, I_C, S_A, S_B, S_C = (row(f"{x}_{j}") for x in "is" for j in "abc")
 OFF_A, OFF_B, OFF_C = (row(f"off_{j}") for j in "abc")
@@ -52,7 +53,7 @@ _jit = njit(fastmath=True, error_model="numpy", forceinline=True)
 
 
 @_jit
-def electrical_step(z, l, N, dt, extended, audited):
+def electrical_step(z, l, N, dt, parts, audited):
     """Advance currents by one step and return the motor torque (the paper's three-phase motor with inverter).
 
     v_j - v_n = R_j i_j + L_j di_j/dt + κ_j ω_m,   Σ i_j = 0,   τ_m = Σ κ_j i_j
@@ -70,17 +71,9 @@ def electrical_step(z, l, N, dt, extended, audited):
     R_a, R_b, R_c = z[R_A * N + l], z[R_B * N + l], z[R_C * N + l]
     L_a, L_b, L_c = z[L_A * N + l], z[L_B * N + l], z[L_C * N + l]
 
-    # six-step references, measured currents, hysteresis comparators, leg voltages
-    I_ref, h = z[I_REF * N + l], z[H * N + l]
-    if len(extended) == 0:
-        u_dc = z[V_DC * N + l]
-        x_a, x_b, x_c = i_a, i_b, i_c
-        n = sector(theta_e)
-        s_a = comparator(z[S_A * N + l], I_ref * six_step(n) - x_a, h)
-        s_b = comparator(z[S_B * N + l], I_ref * six_step(n - 2.0) - x_b, h)
-        s_c = comparator(z[S_C * N + l], I_ref * six_step(n + 2.0) - x_c, h)
-        v_a, v_b, v_c = 0.5 * u_dc * s_a, 0.5 * u_dc * s_b, 0.5 * u_dc * s_c
-    else:
+    # effects on the motor, on what the controller is told, six-step references
+    x_a, x_b, x_c = i_a, i_b, i_c
+    if len(parts) & MOTOR:
         dT = z[DT * N + l]
         k_a *= hooks.emf_factor(z, l, N, i_a, dT)
         k_b *= hooks.emf_factor(z, l, N, i_b, dT)
@@ -90,13 +83,20 @@ def electrical_step(z, l, N, dt, extended, audited):
         L_a *= hooks.inductance_factor(z, l, N, i_a)
         L_b *= hooks.inductance_factor(z, l, N, i_b)
         L_c *= hooks.inductance_factor(z, l, N, i_c)
+    if len(parts) & SENSORS:
         x_a = (1.0 + z[GAIN_A * N + l]) * i_a + z[OFFSET_A * N + l]
         x_b = (1.0 + z[GAIN_B * N + l]) * i_b + z[OFFSET_B * N + l]
         x_c = (1.0 + z[GAIN_C * N + l]) * i_c + z[OFFSET_C * N + l]
         n = sector(theta_e + p * hooks.angle_error(z, l, N, theta_m) + z[COMMUTATION * N + l])
-        s_a = comparator(z[S_A * N + l], I_ref * six_step(n) - x_a, h)
-        s_b = comparator(z[S_B * N + l], I_ref * six_step(n - 2.0) - x_b, h)
-        s_c = comparator(z[S_C * N + l], I_ref * six_step(n + 2.0) - x_c, h)
+    else:
+        n = sector(theta_e)
+
+    # hysteresis comparators and leg voltages
+    I_ref, h = z[I_REF * N + l], z[H * N + l]
+    s_a = comparator(z[S_A * N + l], I_ref * six_step(n) - x_a, h)
+    s_b = comparator(z[S_B * N + l], I_ref * six_step(n - 2.0) - x_b, h)
+    s_c = comparator(z[S_C * N + l], I_ref * six_step(n + 2.0) - x_c, h)
+    if len(parts) & INVERTER:
         dead = z[DEAD_TIME * N + l]
         off_a = dead if s_a != z[S_A * N + l] else z[OFF_A * N + l]
         off_b = dead if s_b != z[S_B * N + l] else z[OFF_B * N + l]
@@ -110,6 +110,9 @@ def electrical_step(z, l, N, dt, extended, audited):
         z[OFF_C * N + l] = max(off_c - dt, 0.0)
         i_dc = 0.5 * (s_a * i_a + s_b * i_b + s_c * i_c)
         z[U_DC * N + l] = u_dc + dt / TAU_DC_LINK * (z[V_DC * N + l] - z[SOURCE_R * N + l] * i_dc - u_dc)
+    else:
+        u_dc = z[V_DC * N + l]
+        v_a, v_b, v_c = 0.5 * u_dc * s_a, 0.5 * u_dc * s_b, 0.5 * u_dc * s_c
     z[S_A * N + l], z[S_B * N + l], z[S_C * N + l] = s_a, s_b, s_c
 
     # voltage left for each inductance; the floating neutral v_n keeps the sum of the currents at zero
@@ -138,20 +141,20 @@ def electrical_step(z, l, N, dt, extended, audited):
 
 
 @_jit
-def mechanical_step(z, l, N, dt, tau_m, extended, audited):
+def mechanical_step(z, l, N, dt, tau_m, parts, audited):
     """Advance rotor and user by one step: J_m dω_m/dt = τ_m - C ω_m - τ_friction(ω_m, τ) - τ_load/GR."""
     theta_m, w_m, theta_u, gr = z[THETA_M * N + l], z[W_M * N + l], z[THETA_U * N + l], z[GR * N + l]
     b, stop, J_m = z[B * N + l], z[THETA_STOP * N + l], z[J_M * N + l]
     F_s, F_d = z[F_S * N + l], z[F_D * N + l]
     tau = tau_m - z[C * N + l] * w_m
+    i_q = 0.5 * (abs(z[I_A * N + l]) + abs(z[I_B * N + l]) + abs(z[I_C * N + l]))
     tau_user = 0.0
-    if len(extended):
-        i_q = 0.5 * (abs(z[I_A * N + l]) + abs(z[I_B * N + l]) + abs(z[I_C * N + l]))
+    if len(parts) & TORQUE:
         tau_user = hooks.user_torque(z, l, N, theta_u)
         tau -= hooks.shaft_torque(z, l, N, theta_m, w_m, theta_u, i_q)
-        if len(extended) > 1:
-            tau -= hooks.tabulated_torque(z, l, N, theta_m, w_m, theta_u, i_q)
-        # through the gear: stiff (the user's load acts at once) or as a spring with the user's own inertia behind it
+    if len(parts) & TABLES:
+        tau -= hooks.tabulated_torque(z, l, N, theta_m, w_m, theta_u, i_q)
+    if len(parts) & GEAR:  # a spring with the user's own inertia behind it; stiff where it does not give
         compliance = z[COMPLIANCE * N + l]
         soft = compliance > 0.0
         K = 1.0 / (compliance if soft else 1.0)
@@ -160,6 +163,9 @@ def mechanical_step(z, l, N, dt, tau_m, extended, audited):
         damper = 2.0 * z[DAMPING * N + l] * (K * J_u) ** 0.5 * (w_m / gr - w_u)
         tau_gear = K * twist + (damper if twist != 0.0 else 0.0)
         tau -= (tau_gear if soft else tau_user) / gr
+    elif len(parts) & TORQUE:  # the user's load acts at once
+        tau -= tau_user / gr
+    if len(parts) & FRICTION:
         direction = 1.0 if (w_m if w_m != 0.0 else tau) > 0.0 else -1.0
         F_s *= hooks.static_friction(z, l, N, theta_m, w_m, theta_u, direction, tau_m)
         F_d *= hooks.sliding_friction(z, l, N, theta_m, w_m, theta_u, direction, tau_m)
@@ -172,7 +178,7 @@ def mechanical_step(z, l, N, dt, tau_m, extended, audited):
     w_next = 0.0 if abs(theta_next) > limit else w_next
     theta_next = min(max(theta_next, -limit), limit)
 
-    if len(extended):
+    if len(parts) & GEAR:
         w_u_next = w_u + dt / J_u * (tau_gear - tau_user)
         theta_soft = min(max(theta_u + w_u_next * dt, -stop), stop)
         w_u_next = w_u_next if abs(theta_soft) < stop else 0.0
@@ -216,7 +222,7 @@ POSITION_DELAY, SPEED_DELAY = row("position_delay.time"), row("speed_delay.time"
 
 
 @njit(fastmath=True, error_model="numpy", cache=True, nogil=True)
-def integrate(z, command, lvdt_noise, out, history, dt, n_substeps, lanes, extended, audited):
+def integrate(z, command, lvdt_noise, out, history, dt, n_substeps, lanes, parts, audited):
     """Run a batch of lanes from the state in `z` over all ticks of `command`.
 
     Parameters
@@ -233,6 +239,8 @@ def integrate(z, command, lvdt_noise, out, history, dt, n_substeps, lanes, exten
         Step. [s]
     n_substeps : int
         Steps from one control tick to the next.
+    parts : tuple
+        As long as the sum of what of the library of effects acts (`ema.models.parts`).
     """
     N = len(lanes)
     n_ticks = command.shape[0]
@@ -242,7 +250,7 @@ def integrate(z, command, lvdt_noise, out, history, dt, n_substeps, lanes, exten
             step = z[LVDT_STEP * N + l]
             theta_u_meas = step * round((z[THETA_U * N + l] + lvdt_noise[tick, l]) / step)
             theta_m_meas, w_m_meas = z[THETA_M * N + l], z[W_M * N + l]
-            if len(extended):
+            if len(parts) & SENSORS:
                 error = hooks.angle_error(z, l, N, theta_m_meas) + z[COMMUTATION * N + l] / z[P * N + l]
                 w_m_meas += (error - z[ANGLE_ERROR * N + l]) / T if tick > 0 else 0.0
                 z[ANGLE_ERROR * N + l] = error
@@ -263,5 +271,5 @@ def integrate(z, command, lvdt_noise, out, history, dt, n_substeps, lanes, exten
         if tick < n_ticks - 1:
             for _ in range(n_substeps):
                 for l in range(N):
-                    tau_m = electrical_step(z, l, N, dt, extended, audited)
-                    mechanical_step(z, l, N, dt, tau_m, extended, audited)
+                    tau_m = electrical_step(z, l, N, dt, parts, audited)
+                    mechanical_step(z, l, N, dt, tau_m, parts, audited)

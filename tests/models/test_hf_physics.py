@@ -223,3 +223,21 @@ def test_a_run_does_not_mind_a_slow_recorder_beside_it():
     assert np.array_equal(beside.theta_m[0], alone.theta_m[0])
     assert np.array_equal(beside.state[0], alone.state[0])
     assert not np.array_equal(beside.theta_m[1], alone.theta_m[1])
+
+
+def test_effects_act_on_their_own_runs_only():
+    """Runs of one call need not have the same effects, and each is as it would be without the others."""
+    k, seeds = np.zeros((3, 6)), np.arange(3)
+    plain = hf.simulate(PLANT, k, seeds=seeds)
+    drag, sag = (
+        {"viscous_drag": {"coefficient": np.array([0.0, 6e-5, 0.0])}},
+        {"supply_sag": {"resistance": np.array([0, 0, 0.3])}},
+    )
+    alone, together = (
+        hf.simulate(PLANT, k, seeds=seeds, effects=drag),
+        hf.simulate(PLANT, k, seeds=seeds, effects={**drag, **sag}),
+    )
+    np.testing.assert_array_equal(together.i[0], plain.i[0])
+    np.testing.assert_array_equal(together.i[1], alone.i[1])
+    assert np.abs(together.i[1] - plain.i[1]).max() > 0.1
+    assert np.abs(together.u_dc[2] - plain.u_dc[2]).max() > 0.1
