@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 from .fit import N_SEEDS, SEED, residuals
 from .noise import Noise
-from .plant import EmaPlant, Point
+from .plant import NOISE_STEPS, STEPS, EmaPlant, Point
 
-STEPS = (2.5e-7, 5e-7, 1e-6, 1.5e-6, 2e-6, 3e-6, 4e-6, 5e-6)  # [s] roughly: a whole number makes a control period
+TRIED = (2.5e-7, 5e-7, 1e-6, 1.5e-6, 2e-6, 3e-6, 4e-6, 5e-6)  # [s] roughly: a whole number makes a control period
 AROUND = (1.0, 1.25, 0.8)  # times the step, for the noise: what is left unknown of it
 CLEAR = 0.7  # share of what is left that another step may leave to be taken instead
 
@@ -26,14 +26,15 @@ def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]
         return max(noise.misfit(list(left.values()), cycles) - 1.0, 0.0)
 
     now = excess(None)
-    left, best = min((excess((step,)), step) for step in (_dividing(plant, about) for about in STEPS))
+    left, best = min((excess((step,)), step) for step in (_dividing(plant, about) for about in TRIED))
     return best if left < CLEAR * now else None
 
 
-def take_step(plant: EmaPlant, step: float) -> None:
-    """Simulate with this step from now on, and with its neighbours where noise is asked for."""
-    plant.steps = (step,)
-    plant.noise_steps = tuple(_dividing(plant, step * factor) for factor in AROUND)
+def take_step(plant: EmaPlant, step: float | None) -> None:
+    """Simulate with this step from now on, and where noise is asked for with its neighbours; None: with the usual."""
+    plant.step = step
+    plant.steps = STEPS if step is None else (step,)
+    plant.noise_steps = NOISE_STEPS if step is None else tuple(_dividing(plant, step * factor) for factor in AROUND)
 
 
 def _dividing(plant: EmaPlant, about: float) -> float:

@@ -60,6 +60,29 @@ class Examination:
     verdict_after: Verdict
 
 
+@dataclass(frozen=True)
+class Path:
+    """One way through the search: with what noise, at which step of the comparators, from where to where.
+
+    `alike` holds, for each effect of `after`, what does as well in its place.
+    """
+
+    noise: Noise
+    step: float | None
+    tried: list[Model]
+    before: Model
+    verdict_before: Verdict
+    after: Model
+    verdict: Verdict
+    alike: list[tuple[str, ...]]
+
+    @classmethod
+    def of(cls, search: Search, model: Model) -> Path:
+        """The beginning, where nothing is explained yet."""
+        v = search.verdict(model)
+        return cls(search.noise, search.plant.step, list(search.tried), model, v, model, v, [])
+
+
 def split(data: Measured) -> tuple[list[int], list[int]]:
     """Training and held-out cycles: of every motion the last third, at least one where there are two."""
     train, heldout = [], []
@@ -86,25 +109,12 @@ def examine(
     ema = EmaPlant(plant, data, n_threads)
     say("switching noise")
     search = Search(ema, Noise(ema, {}), train, heldout, say)
-    before, v = _surely(search, *_faults_only(search), conditions)
-    verdict_before = v
-    say(f"faults only: p = {v.p_value:.2g}, most visible: {v.loudest}")
-    alike: list[tuple[str, ...]] = []
-    after = before
-    faults_do = v.is_noise
-    if faults_do:
-        after, v = _simpler(search, before, v, alike)
-    else:  # first what is wrong, then what is simpler
-        after, v = _grown(search, before, after, v, alike, conditions)
-    if not v.is_noise:  # the library had its chance
-        other, w = _with_other_step(search, after, v, conditions)
-        if other is not after:
-            if after is before:
-                before, verdict_before = other, w
-            after, v = _grown(search, before, other, w, alike, conditions)
-    after, v = _settled(search, after, v)
-    settled = after
-    if not faults_do:
+    path = _shortest(search, _faults_only(search))
+    search.noise, search.tried = path.noise, path.tried
+    take_step(ema, path.step)
+    before, alike = path.before, path.alike
+    after, v = settled, _ = _settled(search, path.after, path.verdict)
+    if not path.verdict_before.is_noise:
         after, v = _simpler(search, after, v, alike)
     after, v = _without_superfluous(search, after, v, alike)
     if after is not settled:
@@ -114,38 +124,68 @@ def examine(
     findings = _findings(search, before, after, v, alike)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
         findings, after = _with_function(search, findings, before, after)
+    if path.step:
+        conditions.append(f"the comparators of the record switch as if evaluated every {1e6 * path.step:g} µs")
     findings.notes.extend(conditions)
-    return Examination(findings, search, before, after, verdict_before, v)
+    return Examination(findings, search, before, after, path.verdict_before, v)
 
 
-def _faults_only(search: Search) -> tuple[Model, Verdict]:
-    """The model with faults alone: what they make of the noise weighs what tells them, so both are found in turn.
+def _faults_only(search: Search) -> list[Path]:
+    """Paths that begin with faults alone: what they make of the noise weighs what tells them; both are found in turn.
 
-    Where that leads nowhere near the data, the faults found stand for something else, and the noise stays nominal.
+    Where that leads nowhere near the data, the faults found stand for something else. Then the noise may be what it is
+    without faults, or what they make of it: friction or drag, whatever their cause, change it hundredfold.
     """
-    model = nominal = start_model(search)
-    v = verdict_nominal = search.verdict(model)
-    if v.is_noise and max(model.fit.point.get(name, 0.0) for name in FAULTS) < FAULT_ALARM:
-        return model, v
-    noise = search.noise
+    model = start_model(search)
+    nominal = Path.of(search, model)
+    if nominal.verdict.is_noise and max(model.fit.point.get(name, 0.0) for name in FAULTS) < FAULT_ALARM:
+        return [nominal]
     while True:
         left = model.excess
         search.noise = Noise(search.plant, model.fit.point)
         model = search.model((), model.fit.free, model.fit.point, model.fit.columns, 1)
-        v = search.verdict(model)
-        if v.is_noise or model.excess < NEARLY:
-            return model, v
+        own = Path.of(search, model)
+        if own.verdict.is_noise or model.excess < NEARLY:
+            return [own]
         if model.excess > CLOSE * left:
-            break
+            return [own] if model.excess < DISTANT else [nominal, own]
         model = search.model((), model.fit.free, model.fit.point, None, 6)
-    if model.excess < DISTANT:
-        return model, v
-    search.noise = noise
-    return nominal, verdict_nominal
+
+
+def _shortest(search: Search, paths: list[Path]) -> Path:
+    """The first path that leaves noise, or else the one that leaves least by the noise of both."""
+    best = _gone(search, paths[0])
+    for path in paths[1:]:
+        if best.verdict.is_noise:
+            break
+        search.say("again, with the noise that faults alone make")
+        other = _gone(search, path)
+        if search.left_more(other.after, best.after, (other.noise, best.noise)) < 0.0:
+            best = other
+    return best
+
+
+def _gone(search: Search, begun: Path) -> Path:
+    """A path to its end: what explains the cycles."""
+    search.noise, search.tried = begun.noise, list(begun.tried)
+    take_step(search.plant, begun.step)
+    before, verdict_before = _surely(search, begun.before, begun.verdict)
+    search.say(f"faults only: p = {verdict_before.p_value:.2g}, most visible: {verdict_before.loudest}")
+    alike = list(begun.alike)
+    after, v = _grown(search, before, before, verdict_before, alike)
+    if not v.is_noise:  # the library had its chance
+        other, w = _with_other_step(search, after, v)
+        if other is not after:
+            if after is before:
+                before, verdict_before = other, w
+            after, v = _grown(search, before, other, w, alike)
+    if verdict_before.is_noise:
+        after, v = _simpler(search, after, v, alike)
+    return Path(search.noise, search.plant.step, search.tried, before, verdict_before, after, v, alike)
 
 
 def _grown(
-    search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]], conditions: list[str]
+    search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]]
 ) -> tuple[Model, Verdict]:
     """`after` with as many further effects as are real."""
     left = after.excess
@@ -160,14 +200,15 @@ def _grown(
             real = _with_own_noise(search, [m for m in models if m.heldout < after.heldout + SAME], after)
         if not real:
             break
-        best = real[0]
-        alike.append(tuple(m.names[-1] for m in real[1:] if _is_alike(m, best)))
-        after = best
+        after, *rivals = [m for m in real if _is_alike(m, real[0])]
         if after.excess < NEW_NOISE * left:  # what runs differ by depends on the point, and so does every weight
             left = max(after.excess, CHANCE)
             search.noise = Noise(search.plant, after.fit.point)
-            after = search.model(after.effects, after.fit.free, after.fit.point, after.fit.columns, 2)
-        after, v = _surely(search, after, search.verdict(after), conditions)
+            after, *rivals = [
+                search.model(m.effects, m.fit.free, m.fit.point, m.fit.columns, 2) for m in (after, *rivals)
+            ]
+        alike.append(tuple(m.names[-1] for m in rivals if _is_alike(m, after)))
+        after, v = _surely(search, after, search.verdict(after))
         if not v.is_noise:
             after, v = _settled(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
@@ -199,16 +240,16 @@ def _with_own_noise(search: Search, models: list[Model], after: Model) -> list[M
     return [m for m, _ in found]
 
 
-def _surely(search: Search, model: Model, v: Verdict, conditions: list[str]) -> tuple[Model, Verdict]:
+def _surely(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     """The verdict, in a close case by a null distribution from more runs and by another step of the comparators."""
     if v.is_noise or model.excess > NEARLY:
         return model, v
     search.noise = Noise(search.plant, model.fit.point, N_RUNS_SURE)
     v = search.verdict(model)
-    return (model, v) if v.is_noise else _with_other_step(search, model, v, conditions)
+    return (model, v) if v.is_noise else _with_other_step(search, model, v)
 
 
-def _with_other_step(search: Search, model: Model, v: Verdict, conditions: list[str]) -> tuple[Model, Verdict]:
+def _with_other_step(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     """`model` on the grid on which the comparators of the record seem to switch, if that is another than ours."""
     step = find_step(search.plant, search.noise, model.fit.point, search.train)
     if step is None:
@@ -218,7 +259,6 @@ def _with_other_step(search: Search, model: Model, v: Verdict, conditions: list[
     model = search.model(model.effects, model.fit.free, model.fit.point, None, 2)
     v = search.verdict(model)
     search.say(f"comparators every {1e6 * step:g} µs: p = {v.p_value:.2g}")
-    conditions.append(f"the comparators of the record switch as if evaluated every {1e6 * step:g} µs")
     return model, v
 
 
@@ -302,7 +342,7 @@ def _still_alike(search: Search, model: Model, place: int, rivals: tuple[str, ..
     for rival in (r for r in rivals if r not in model.names):
         beside = [m for m in search.tried if m.names and m.names[-1] == rival]
         m = search.instead(model, model.effects[place], beside[-1]) if beside else model
-        if m.heldout - model.heldout <= ALIKE * model.excess + CHANCE:
+        if _is_alike(m, model):
             kept.append(rival)
     return tuple(kept)
 

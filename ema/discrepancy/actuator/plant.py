@@ -49,6 +49,7 @@ class EmaPlant:
     def __init__(self, plant: Actuator, data: Measured, n_threads: int = 2):
         self.plant, self.data, self.n_threads = plant, data, n_threads
         self.n_runs = 0
+        self.step: float | None = None  # the one step that a record seems to have, where it was asked
         self.steps: tuple[float, ...] = STEPS
         self.noise_steps: tuple[float, ...] = NOISE_STEPS
         self.n_motions = len(data.commands)

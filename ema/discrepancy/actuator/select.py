@@ -51,6 +51,7 @@ ONE_CAUSE = 0.25  # relative spread up to which several parameters are one cause
 K_SEEN = 0.01  # a fault that is there
 COLLINEAR = 0.8  # cosine from which two effects look like each other
 FAR = 100.0  # excess from which candidates are simulated before they are ranked
+NEARLY = 1.5  # misfit of a model that may be the right one, but for noise that is not its own
 NEAR_NOISE = 0.05  # excess below which a fit need not go on
 MAX_EFFECTS = 3
 
@@ -360,9 +361,10 @@ class Search:
         return len(faults) > 1 and all(model.fit.point.get(name, 0.0) > K_SEEN for name in faults)
 
     def _clear(self, refined: dict[str, Model], promised: float) -> bool:
-        """Whether what is left to try promises far less than what was reached."""
+        """Whether one leaves nearly nothing, and what is left to try promises far less."""
         n = sum(len(self.plant.data.y[c]) for c in self.train)
-        return promised / n > 3.0 * min(m.fit.misfit for m in refined.values()) + 0.5
+        reached = min(m.fit.misfit for m in refined.values())
+        return reached < NEARLY and promised / n > 3.0 * reached + 0.5
 
     def _better(self, starts: Sequence[Point], model: Model) -> tuple[Point, float]:
         """The start that simulates closest to the training cycles, and its cost."""
