@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
 from ema.core.config import Settings
 from ema.core.units import quantity
@@ -100,7 +100,9 @@ class Actuator(Settings):
     control: Control
     sensors: Sensors
     motion: Motion
-    effects: dict[str, dict[str, float]] = Field(default_factory=dict, description="terms beyond the nominal model")
+    effects: dict[str, dict[str, FiniteFloat]] = Field(
+        default_factory=dict, description="terms beyond the nominal model"
+    )
     intervals: dict[str, dict[str, tuple[float, float]]] = Field(
         default_factory=dict, exclude=True, description="of 95 %, of the effects' parameters, where they were measured"
     )

@@ -10,7 +10,7 @@ from ema.core import config
 from ema.core.config import Settings
 from ema.core.names import CHANNELS
 from ema.core.units import quantity, to_unit
-from ema.effects import registry
+from ema.effects import checked
 from ema.effects.torque_term import COLUMNS
 
 INSTANCE = "#"  # cogging#2 is a second cogging line
@@ -70,14 +70,9 @@ class Axis(Settings):
     def _known_effects(cls, effects: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
         for key, values in effects.items():
             name = key.split(INSTANCE)[0]
-            if name not in registry() or "axis" not in registry()[name].plants:
-                known = ", ".join(n for n, effect in registry().items() if "axis" in effect.plants)
-                raise ValueError(f"effect '{key}' is unknown for an axis; known: {known}")
             if key != name and name != "cogging":
                 raise ValueError(f"effect '{key}': only cogging may occur more than once")
-            unknown = sorted(set(values) - {p.name for p in registry()[name].parameters})
-            if unknown:
-                raise ValueError(f"effect '{key}' has no parameter {', '.join(unknown)}")
+            checked({name: values}, "axis")
         return effects
 
     @field_validator("structure")

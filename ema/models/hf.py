@@ -12,14 +12,14 @@ from scipy.interpolate import CubicSpline
 
 from ema import faults
 from ema.core.errors import ConfigError
-from ema.effects import registry
+from ema.effects import checked, registry
 from ema.effects.trapezoid import sector, six_step
 
 from . import parts
 from .actuator import Actuator
 from .envelope import envelope
 from .hf_kernel import OUTPUTS, integrate
-from .layout import ENERGIES, N_ROWS, N_STATE, ROWS, STATE, row
+from .layout import ENERGIES, N_ROWS, N_STATE, STATE, row
 
 N_LANES = 16
 DT = 1e-6  # [s]
@@ -83,13 +83,12 @@ def parameters(plant: Actuator, k: np.ndarray, effects: Effects, dT: float | np.
     for name, effect in registry().items():
         for parameter in effect.parameters:
             z[row(f"{name}.{parameter.name}")] = parameter.neutral
+    try:
+        checked(effects, "ema")
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
     for name, values in effects.items():
-        if name not in registry():
-            raise ConfigError(f"effect '{name}' is unknown; known: {', '.join(registry())}")
         for parameter_name, value in values.items():
-            if f"{name}.{parameter_name}" not in ROWS:
-                known = ", ".join(p.name for p in registry()[name].parameters)
-                raise ConfigError(f"effect '{name}' has no parameter '{parameter_name}'; it has: {known}")
             z[row(f"{name}.{parameter_name}")] = value
     z[row("J_m")] *= 1.0 + z[row("inertia.change")]
     return z

@@ -21,7 +21,7 @@ from .extension import as_extension
 from .fit import Fit
 from .noise import N_RUNS_SURE, Noise, Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
-from .select import FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, Model, Search, start_model
+from .select import CHANCE, FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, Model, Search, start_model
 from .structure import structure
 
 MIN_CYCLES = 2
@@ -36,7 +36,6 @@ DISTANT = 10.0  # excess of a model that is far from the data
 ALIKE = 0.6  # share by which two models may leave more or less and be alike: laws are approximations
 NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
 CLOSE = 0.5  # share of what was left, from which another turn is not worth it
-CHANCE = 0.03  # difference in misfit that seeds make
 SURE = 0.1  # gain in misfit from which an effect is preferred to faults that explain a record just as simply
 SAME = 0.05  # difference in held-out misfit up to which fewer causes are preferred
 NEARLY = 0.5  # excess of a model that may be the right one but for switching

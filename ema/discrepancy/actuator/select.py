@@ -49,6 +49,7 @@ NO_WORSE = 1.5  # times the squared residual of the best start, from which a sta
 HOPELESS = 5.0  # held-out misfit after a few steps from which an effect in place of faults is given up
 ONE_CAUSE = 0.25  # relative spread up to which several parameters are one cause
 K_SEEN = 0.01  # a fault that is there
+CHANCE = 0.03  # difference in misfit that seeds make
 COLLINEAR = 0.8  # cosine from which two effects look like each other
 FAR = 100.0  # excess from which candidates are simulated before they are ranked
 NEARLY = 1.5  # misfit of a model that may be the right one, but for noise that is not its own
@@ -279,17 +280,23 @@ class Search:
             if c.effect in model.names or common < K_SEEN or len(faults) < 2 or len(gone) < len(c.linear):
                 continue
             (c,) = self.probe([c])
-            rest = {name: 0.0 if name in gone else k[name] - common for name in faults}
-            start = self.start_with(model, c, rest)
-            frees = tuple(f for f in model.fit.free if f.name not in gone)
-            made = self.model((*model.effects, c), (*frees, *c.frees), start, None, 3)
-            if made.heldout > HOPELESS:
-                continue
-            made = self.model(made.effects, made.fit.free, made.fit.point, made.fit.columns, 7)
-            values = np.array([made.fit.point[f"{c.effect}.{name}"] for name in c.linear])
-            if np.ptp(values) <= ONE_CAUSE * abs(values.mean()):
-                found.append(made)
+            while made := self._in_place_of(model, c, gone, common):
+                values = np.array([made.fit.point[f"{c.effect}.{name}"] for name in c.linear])
+                if np.ptp(values) <= ONE_CAUSE * abs(values.mean()):
+                    found.append(made)
+                gone.remove(max(gone, key=lambda name: k[name]))  # what is small may be there
+                if made.heldout < model.heldout + CHANCE or len(gone) <= len(c.linear):
+                    break
         return sorted(found, key=lambda m: m.heldout)
+
+    def _in_place_of(self, model: Model, c: Candidate, gone: Sequence[str], common: float) -> Model | None:
+        """`model` with an effect for what several faults have in common, and without those of them that are gone."""
+        rest = {name: 0.0 if name in gone else model.fit.point[name] - common for name in c.faults}
+        frees = tuple(f for f in model.fit.free if f.name not in gone)
+        made = self.model((*model.effects, c), (*frees, *c.frees), self.start_with(model, c, rest), None, 3)
+        if made.heldout > HOPELESS:
+            return None
+        return self.model(made.effects, made.fit.free, made.fit.point, made.fit.columns, 7)
 
     def _looking_like(self, model: Model, best: Model, screened: Sequence[Screened]) -> list[Screened]:
         """Those that can do, beside what is free in `model`, nearly all that the last effect of `best` does."""
