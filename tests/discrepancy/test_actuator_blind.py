@@ -78,3 +78,19 @@ def test_a_torque_line_at_no_integer_order_is_not_called_cogging(hidden, shipped
     assert findings.verdict == "unexplained"
     assert findings.effects == []
     assert findings.structure["orders"][0]["order"] == pytest.approx(7.37, abs=0.05)
+
+
+@pytest.mark.slow
+def test_both_lines_of_cogging_are_found(hidden, shipped_plant):
+    """The motor cogs at 12 and, a fifth as strong, at 24 periods per turn: the one must not bend for the other."""
+    record = hide(hidden, cogging=0.012, cogging_order=12.0, cogging_phase=0.5, k1=0.03)
+    findings = examine(shipped_plant, measured(shipped_plant, [record])).findings
+    assert findings.verdict == "explained"
+    assert [e.name for e in findings.effects] == ["cogging"]
+    amplitude = findings.effects[0].parameters["amplitude"]
+    assert amplitude.value == pytest.approx(0.012, rel=0.02)
+    assert amplitude.low < 0.012 < amplitude.high
+    (further,) = findings.unnamed
+    assert further.parameters["order"].value == pytest.approx(24.0, abs=0.1)
+    assert further.parameters["amplitude"].value == pytest.approx(0.0024, rel=0.1)
+    assert findings.gain.heldout_after < 1.2 * findings.gain.noise_floor

@@ -166,8 +166,11 @@ def _plain(effect: str, *names: str, step: Mapping[str, float] | None = None, **
     return Candidate(effect, tuple(frees), fixed, names, at)
 
 
-def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque]) -> list[Candidate]:
-    """What to try on these cycles; nonlinear parameters where the residual torque suggests them."""
+def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line: str = "cogging") -> list[Candidate]:
+    """What to try on these cycles; nonlinear parameters where the residual torque suggests them.
+
+    A torque line is tried as the effect `line`: the first is cogging, a further one stands beside it.
+    """
     found = [
         _plain("asymmetric_friction", "asymmetry"),
         _plain("clock_skew", "rate", step={"rate": 1e-4}),
@@ -207,11 +210,11 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque]) -> li
         found.append(_plain("gear_compliance", "compliance", step=step, inertia=gear.inertia, damping=gear.damping))
     for order, _ in lines(torques):
         frees = (
-            free("cogging.amplitude", 0.002),
-            Free("cogging.order", max(order - 0.6, 1.0), order + 0.6, 0.04),
-            Free("cogging.phase", -2.0 * np.pi, 2.0 * np.pi, 0.3),
+            free(f"{line}.amplitude", 0.002),
+            Free(f"{line}.order", max(order - 0.6, 1.0), order + 0.6, 0.04),
+            Free(f"{line}.phase", -2.0 * np.pi, 2.0 * np.pi, 0.3),
         )
-        found.append(Line("cogging", frees, {"order": order}, ("amplitude",), (0.005,)))
+        found.append(Line(line, frees, {"order": order}, ("amplitude",), (0.005,)))
     for centre, width in bumps(torques):
         found.append(_plain("position_friction", "height", step={"centre": 0.25 * width}, centre=centre, width=width))
     return found

@@ -376,7 +376,9 @@ def _does_it(search: Search, model: Model, previous: Model) -> bool:
 
 
 def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]]) -> Findings:
-    odd = [c for c in after.effects if c.effect == "cogging" and not _integer(after.fit)]
+    torque_lines = [c for c in after.effects if c.effect in ("cogging", "torque_line")]
+    odd = [c for c in torque_lines if not _integer(after.fit, c.effect)]
+    further = [c for c in torque_lines if c.effect == "torque_line" and not odd]
     explained = v.is_noise or (bool(after.effects) and after.excess < ENOUGH * before.excess + SLACK)
     verdict: Literal["adequate", "explained", "unexplained"] = (
         "adequate" if not after.effects and v.is_noise else "explained" if explained and not odd else "unexplained"
@@ -393,7 +395,7 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
         notes.append("a small rest above noise is left: the true law has another form than the library's")
     if not search.plant.data.has_temperature:
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
-    kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c not in odd]
+    kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c.effect != "torque_line" and c not in odd]
     rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
     found = [_found(search, after, c.effect, a, rest) for c, a in kept]
     if too_little and found:
@@ -401,24 +403,20 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
             f"{', '.join(e.name for e in found)} would explain {share:.0%} of the rest: too little to be named"
         )
         found = []
-    if odd:
-        at = after.fit.point["cogging.order"]
+    for c in odd:
+        at, amplitude = (after.fit.point[f"{c.effect}.{name}"] for name in ("order", "amplitude"))
         notes.append(f"a torque line at the non-integer order {at:.4g} is no cogging of this motor")
-        shape["orders"] = [
-            {
-                "order": at,
-                "amplitude": after.fit.point["cogging.amplitude"],
-                "share": 1.0 - after.excess / before.excess,
-            }
-        ]
-        shape["sentences"] = [
-            f"a torque line of {after.fit.point['cogging.amplitude']:.2g} N m at {at:.4g} periods per rotor turn"
-        ]
+        shape["orders"] = [{"order": at, "amplitude": amplitude, "share": 1.0 - after.excess / before.excess}]
+        shape["sentences"] = [f"a torque line of {amplitude:.2g} N m at {at:.4g} periods per rotor turn"]
     tried = [
         {"name": " + ".join(m.names) or "faults only", "score": -m.heldout}
         for m in sorted(search.tried, key=lambda m: m.heldout)
     ]
-    unnamed = [_found(search, after, c.effect, (), rest, "torque_line") for c in odd]
+    unnamed = [_found(search, after, c.effect, (), rest, "torque_line") for c in (*odd, *further)][:1]
+    if further:
+        values = {name: q.value for name, q in unnamed[0].parameters.items()}
+        unnamed = [replace(unnamed[0], sentence=f"a further {registry()['cogging'].said(values)}")]
+        notes.append(f"beside it stands {unnamed[0].sentence}")
     return Findings(verdict, found, _gain(search, before, after), shape, tried, notes, unnamed=unnamed)
 
 
@@ -444,9 +442,9 @@ def _with_function(search: Search, findings: Findings, before: Model, after: Mod
     return findings, after
 
 
-def _integer(fit: Fit) -> bool:
-    order = fit.point["cogging.order"]
-    sd = fit.sd["cogging.order"]
+def _integer(fit: Fit, line: str) -> bool:
+    order = fit.point[f"{line}.order"]
+    sd = fit.sd[f"{line}.order"]
     return abs(order - round(order)) < max(NON_INTEGER, 3.0 * sd)
 
 

@@ -236,9 +236,9 @@ class Search:
 
     def extend(self, model: Model) -> list[Model]:
         """The best models with one more effect, best first."""
-        found = [
-            c for c in candidates(self.plant.plant, self.plant.data, self.torques(model)) if c.effect not in model.names
-        ]
+        line = "torque_line" if "cogging" in model.names else "cogging"
+        found = candidates(self.plant.plant, self.plant.data, self.torques(model), line)
+        found = [c for c in found if c.effect not in model.names]
         refined: dict[str, Model] = {}
         cost = sum(float(r @ r) for r in model.fit.residuals.values())
         worth = max(WORTH_A_FIT * (cost - cost / model.fit.misfit), AT_LEAST * cost)
