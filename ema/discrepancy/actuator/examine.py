@@ -188,7 +188,7 @@ def _grown(
 ) -> tuple[Model, Verdict]:
     """`after` with as many further effects as are real."""
     left = after.excess
-    while not v.is_noise and len(after.effects) < MAX_EFFECTS:
+    while not v.is_noise and len(set(after.names) - {"torque_line"}) < MAX_EFFECTS:  # a second line is no further cause
         enough = bool(after.effects) and after.excess < ENOUGH * before.excess + SLACK
         models = search.extend(after)
         needed = max(STRONG * after.excess, CHANCE) if enough else WORTH_IT * after.excess
