@@ -13,13 +13,27 @@ from .fit import N_SEEDS, SEED, residuals
 from .noise import Noise
 from .plant import NOISE_STEPS, STEPS, EmaPlant, Point
 
-TRIED = (2.5e-7, 5e-7, 1e-6, 1.5e-6, 2e-6, 3e-6, 4e-6, 5e-6)  # [s] roughly: a whole number makes a control period
+TRIED = (
+    2.5e-7,
+    5e-7,
+    1e-6,
+    1.5e-6,
+    2e-6,
+    3e-6,
+    4e-6,
+    5e-6,
+    7e-6,
+    1e-5,
+    1.4e-5,
+    2e-5,
+)  # [s] roughly: a whole number makes a control period
 AROUND = (1.0, 1.25, 0.8)  # times the step, for the noise: what is left unknown of it
 CLEAR = 0.7  # share of what is left that another step may leave to be taken instead
+PLAIN = 0.3  # the same where effects have not been looked for: no other flaw goes below 0.75, a coarse step to 0.2
 
 
-def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]) -> float | None:
-    """The integration step with which `point` leaves clearly less of the cycles than now; None if there is none. [s]"""
+def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int], share: float) -> float | None:
+    """The integration step with which `point` leaves less than a share of what is left now, None without one. [s]"""
 
     def excess(steps: tuple[float, ...] | None) -> float:
         left = residuals(plant, noise, point, cycles, plant.n_seeds(cycles, N_SEEDS), SEED, steps)
@@ -27,7 +41,7 @@ def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]
 
     now = excess(None)
     left, best = min((excess((step,)), step) for step in (_dividing(plant, about) for about in TRIED))
-    return best if left < CLEAR * now else None
+    return best if left < share * now else None
 
 
 def take_step(plant: EmaPlant, step: float | None) -> None:

@@ -14,7 +14,7 @@ from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
 from ema.effects import registry
 from ema.models.actuator import Actuator
 
-from .comparators import find_step, take_step
+from .comparators import CLEAR, PLAIN, find_step, take_step
 from .conditions import as_recorded
 from .cycles import Measured
 from .extension import as_extension
@@ -169,6 +169,8 @@ def _gone(search: Search, begun: Path) -> Path:
     search.noise, search.tried = begun.noise, list(begun.tried)
     take_step(search.plant, begun.step)
     before, verdict_before = _surely(search, begun.before, begun.verdict)
+    if not verdict_before.is_noise:
+        before, verdict_before = _with_other_step(search, before, verdict_before, PLAIN)
     search.say(f"faults only: p = {verdict_before.p_value:.2g}, most visible: {verdict_before.loudest}")
     alike = list(begun.alike)
     after, v = _grown(search, before, before, verdict_before, alike)
@@ -209,6 +211,8 @@ def _grown(
         alike.append(tuple(m.names[-1] for m in rivals if _is_alike(m, after)))
         after, v = _surely(search, after, search.verdict(after))
         if not v.is_noise:
+            after, v = _with_other_step(search, after, v, PLAIN)
+        if not v.is_noise:
             after, v = _settled(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
@@ -248,9 +252,9 @@ def _surely(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     return (model, v) if v.is_noise else _with_other_step(search, model, v)
 
 
-def _with_other_step(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
+def _with_other_step(search: Search, model: Model, v: Verdict, share: float = CLEAR) -> tuple[Model, Verdict]:
     """`model` on the grid on which the comparators of the record seem to switch, if that is another than ours."""
-    step = find_step(search.plant, search.noise, model.fit.point, search.train)
+    step = find_step(search.plant, search.noise, model.fit.point, search.train, share)
     if step is None:
         return model, v
     take_step(search.plant, step)
