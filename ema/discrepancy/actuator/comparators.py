@@ -29,6 +29,7 @@ TRIED = (
 )  # [s] roughly: a whole number makes a control period
 AROUND = (1.0, 1.25, 0.8)  # times the step, for the noise: what is left unknown of it
 CLEAR = 0.7  # share of what is left that another step may leave to be taken instead
+FELT = 0.05  # difference in misfit; less is chance
 PLAIN = 0.3  # the same where effects have not been looked for: no other flaw goes below 0.75, a coarse step to 0.2
 
 
@@ -40,8 +41,9 @@ def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]
         return max(noise.misfit(list(left.values()), cycles) - 1.0, 0.0)
 
     now = excess(None)
-    left, best = min((excess((step,)), step) for step in (_dividing(plant, about) for about in TRIED))
-    return best if left < share * now else None
+    left = {step: excess((step,)) for step in (_dividing(plant, about) for about in TRIED)}
+    best = max(step for step, x in left.items() if x < min(left.values()) + FELT)  # the coarser, the cheaper
+    return best if left[best] < min(share * now, now - FELT) else None
 
 
 def take_step(plant: EmaPlant, step: float | None) -> None:

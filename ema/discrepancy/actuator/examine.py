@@ -249,7 +249,7 @@ def _surely(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
         return model, v
     search.noise = Noise(search.plant, model.fit.point, N_RUNS_SURE)
     v = search.verdict(model)
-    return (model, v) if v.is_noise else _with_other_step(search, model, v)
+    return (model, v) if v.is_noise else _with_other_step(search, model, v, PLAIN)
 
 
 def _with_other_step(search: Search, model: Model, v: Verdict, share: float = CLEAR) -> tuple[Model, Verdict]:
