@@ -95,3 +95,17 @@ def test_a_user_that_still_swings_starts_with_its_speed(hidden, shipped_plant):
     assert found[0] == 0.0
     assert max(abs(found)) > 5e-3
     assert found == pytest.approx(rise, rel=0.1, abs=0.03)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("flaws", [{"k3": 0.05}, {"k3": 0.05, "viscous": 6e-5}], ids=["faults", "drag"])
+def test_comparators_ten_times_as_coarse_are_a_condition_and_no_cause(hidden, shipped_plant, flaws):
+    """Another simulator evaluates them every 10 µs: currents overshoot the band, which is no flaw of the actuator."""
+    bench = hidden.Bench(substeps=10)
+    cycles = hidden.cycles(hidden.Flaws(**flaws), 3, 4, (hidden.chirp(),), bench)
+    record = Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))
+    findings = examine(shipped_plant, measured(shipped_plant, [record])).findings
+    assert [e.name for e in findings.effects] == ["viscous_drag"] * ("viscous" in flaws)
+    assert findings.verdict == ("explained" if findings.effects else "adequate")
+    assert any("evaluated every 10 µs" in note for note in findings.notes)
+    assert findings.gain.k_after[2] == pytest.approx(0.05, abs=0.005)
