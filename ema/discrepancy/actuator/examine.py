@@ -26,7 +26,7 @@ from .structure import structure
 
 MIN_CYCLES = 2
 IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
-FORM = 0.1  # of a value, for a rest as large as the whole effect: how much of a law of another form is taken for it
+FORM = 0.5  # of a value, for a rest as large as the whole effect: the interval holds what would take all of the rest
 WORTH_IT = 0.25  # share of what is left that a further effect must take on held-out cycles
 ENOUGH = 0.05  # share of what faults alone leave, from which effects explain it but for the form of their laws
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
