@@ -13,23 +13,11 @@ from .fit import N_SEEDS, SEED, residuals
 from .noise import Noise
 from .plant import NOISE_STEPS, STEPS, EmaPlant, Point
 
-TRIED = (
-    2.5e-7,
-    5e-7,
-    1e-6,
-    1.5e-6,
-    2e-6,
-    3e-6,
-    4e-6,
-    5e-6,
-    7e-6,
-    1e-5,
-    1.4e-5,
-    2e-5,
-)  # [s] roughly: a whole number makes a control period
+# [s] roughly: a whole number makes a control period
+TRIED = (2.5e-7, 5e-7, 1e-6, 1.5e-6, 2e-6, 3e-6, 4e-6, 5e-6, 7e-6, 1e-5, 1.4e-5, 2e-5)
+FELT = 0.05  # difference in misfit; less is chance
 AROUND = (1.0, 1.25, 0.8)  # times the step, for the noise: what is left unknown of it
 CLEAR = 0.7  # share of what is left that another step may leave to be taken instead
-FELT = 0.05  # difference in misfit; less is chance
 PLAIN = 0.3  # the same where effects have not been looked for: no other flaw goes below 0.75, a coarse step to 0.2
 
 

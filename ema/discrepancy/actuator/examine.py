@@ -172,7 +172,7 @@ def _gone(search: Search, begun: Path) -> Path:
     if not verdict_before.is_noise:
         before, verdict_before = _with_other_step(search, before, verdict_before, PLAIN)
     search.say(f"faults only: p = {verdict_before.p_value:.2g}, most visible: {verdict_before.loudest}")
-    alike = list(begun.alike)
+    alike: list[tuple[str, ...]] = []
     after, v = _grown(search, before, before, verdict_before, alike)
     if not v.is_noise:  # the library had its chance
         other, w = _with_other_step(search, after, v)
