@@ -8,7 +8,8 @@ from numba import njit
 @njit(inline="always")
 def comparator(s_j, error_j, h):
     """State ±1 of a leg: up when the current is more than `h` too low, down when too high, else unchanged."""
-    return 1.0 if error_j > h else (-1.0 if error_j < -h else s_j)
+    held_or_up = 1.0 if error_j > h else s_j
+    return -1.0 if error_j < -h else held_or_up
 
 
 @njit(inline="always")

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
+import numpy as np
 from numba import njit
 
 from .vector_math import TWO_PI, fraction_of_turn
@@ -21,11 +20,12 @@ def sector(theta_e):
     """Number of the 60° sector, counted from 30° electrical; one number for all three phases, so that at a corner
     rounding cannot leave two of them idle at once.
     """
-    return math.floor(6.0 * theta_e / TWO_PI - 0.5)
+    return np.floor(6.0 * theta_e / TWO_PI - 0.5)
 
 
 @njit(inline="always")
 def six_step(sector_j):
     """Reference current per unit of a phase: 1 in its sectors 0 and 1, -1 in 3 and 4, else 0 (phase B: sector - 2)."""
-    m = sector_j - 6.0 * math.floor(sector_j / 6.0)
-    return 1.0 if m < 1.5 else (-1.0 if (m > 2.5 and m < 4.5) else 0.0)
+    m = sector_j - 6.0 * np.floor(sector_j / 6.0)
+    away = abs(3.0 - abs(m - 3.5))  # from the middle of sectors 0 and 1, which is 0.5
+    return min(max(1.5 - away, -1.0), 1.0)

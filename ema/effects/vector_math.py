@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 TWO_PI = 2.0 * math.pi
@@ -12,14 +13,13 @@ TWO_PI = 2.0 * math.pi
 @njit(inline="always")
 def fraction_of_turn(turns):
     """Turns folded to [-0.5, 0.5)."""
-    return turns - math.floor(turns + 0.5)
+    return turns - np.floor(turns + 0.5)
 
 
 @njit(inline="always")
 def sin(x):
     """Sine to 3e-11 absolute for |x| up to some thousand turns (odd polynomial, Chebyshev fit on a quarter turn)."""
-    u = fraction_of_turn(x / TWO_PI)  # sin is odd about u = 0 and even about u = ±0.25
-    u = u if abs(u) <= 0.25 else (0.5 - u if u > 0.0 else -0.5 - u)
+    u = 0.25 - abs(fraction_of_turn(x / TWO_PI - 0.25))  # sine is even about a quarter of a turn
     s = u * u
     return u * (
         6.283185307072583

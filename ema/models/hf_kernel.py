@@ -16,10 +16,7 @@ from ema.effects.inverter import comparator, leg_voltage
 from ema.effects.trapezoid import sector, six_step, trap
 from ema.effects.vector_math import TWO_PI, cos, sin
 
-from . import (
-    hooks,
-    jit,  # noqa: F401 - sets where kernels are cached
-)
+from . import hooks, jit
 from .layout import row
 from .parts import FRICTION, GEAR, INVERTER, MOTOR, SENSORS, TABLES, TORQUE
 
@@ -39,7 +36,8 @@ E_ELECTRIC, E_COPPER, E_SHAFT, E_FRICTION, E_USER = map(
     row, ("E_electric", "E_copper", "E_shaft", "E_friction", "E_user")
 )
 COMPLIANCE, INERTIA, DAMPING = (row(f"gear_compliance.{x}") for x in ("compliance", "inertia", "damping"))
-SOURCE_R, DEAD_TIME, COMMUTATION = map(row, ("supply_sag.resistance", "dead_time.time", "commutation_offset.angle"))
+SOURCE_R, DEAD_TIME = map(row, ("supply_sag.resistance", "dead_time.time"))
+COMMUTATION, APART = map(row, ("commutation_offset.angle", "commutation_offset.apart"))
 GAIN_A, GAIN_B, GAIN_C = (row(f"current_gain.gain_{j}") for j in "abc")
 OFFSET_A, OFFSET_B, OFFSET_C = (row(f"current_offset.offset_{j}") for j in "abc")
 
@@ -49,7 +47,7 @@ THIRD = TWO_PI / 3.0
 COS_THIRD, SIN_THIRD = -0.5, 0.75**0.5
 TAU_DC_LINK = 1e-3  # [s] capacitor of the DC link: it hides the switching from the source
 
-_jit = njit(fastmath=True, error_model="numpy", forceinline=True)
+_jit = njit(fastmath=jit.FAST, error_model="numpy", forceinline=True)
 
 
 @_jit
@@ -115,12 +113,12 @@ def electrical_step(z, l, N, dt, parts, audited):
         v_a, v_b, v_c = 0.5 * u_dc * s_a, 0.5 * u_dc * s_b, 0.5 * u_dc * s_c
     z[S_A * N + l], z[S_B * N + l], z[S_C * N + l] = s_a, s_b, s_c
 
-    # voltage left for each inductance; the floating neutral v_n keeps the sum of the currents at zero
-    y_a, y_b, y_c = 1.0 / L_a, 1.0 / L_b, 1.0 / L_c
+    # the floating neutral v_n keeps the sum of the currents at zero; eliminated from L_j di_j/dt = u_j - v_n
     u_a, u_b, u_c = v_a - R_a * i_a - k_a * w_m, v_b - R_b * i_b - k_b * w_m, v_c - R_c * i_c - k_c * w_m
-    v_n = (u_a * y_a + u_b * y_b + u_c * y_c) / (y_a + y_b + y_c)
-    n_a = i_a + (u_a - v_n) * y_a * dt
-    n_b = i_b + (u_b - v_n) * y_b * dt
+    u_ab, u_bc, u_ca = u_a - u_b, u_b - u_c, u_c - u_a
+    dt_LL = dt / (L_a * L_b + L_b * L_c + L_c * L_a)
+    n_a = i_a + (u_ab * L_c - u_ca * L_b) * dt_LL
+    n_b = i_b + (u_bc * L_a - u_ab * L_c) * dt_LL
     n_c = -n_a - n_b
     z[I_A * N + l], z[I_B * N + l], z[I_C * N + l] = n_a, n_b, n_c
 
@@ -221,7 +219,7 @@ def delayed(history, tick, l, delay_ticks):
 POSITION_DELAY, SPEED_DELAY = row("position_delay.time"), row("speed_delay.time")
 
 
-@njit(fastmath=True, error_model="numpy", cache=True, nogil=True)
+@njit(fastmath=jit.FAST, error_model="numpy", cache=True, nogil=True)
 def integrate(z, command, lvdt_noise, out, history, dt, n_substeps, lanes, parts, audited):
     """Run a batch of lanes from the state in `z` over all ticks of `command`.
 
@@ -251,7 +249,8 @@ def integrate(z, command, lvdt_noise, out, history, dt, n_substeps, lanes, parts
             theta_u_meas = step * round((z[THETA_U * N + l] + lvdt_noise[tick, l]) / step)
             theta_m_meas, w_m_meas = z[THETA_M * N + l], z[W_M * N + l]
             if len(parts) & SENSORS:
-                error = hooks.angle_error(z, l, N, theta_m_meas) + z[COMMUTATION * N + l] / z[P * N + l]
+                zero = (z[COMMUTATION * N + l] - z[APART * N + l]) / z[P * N + l]
+                error = hooks.angle_error(z, l, N, theta_m_meas) + zero
                 w_m_meas += (error - z[ANGLE_ERROR * N + l]) / T if tick > 0 else 0.0
                 z[ANGLE_ERROR * N + l] = error
                 theta_m_meas += error

@@ -13,9 +13,10 @@ from numba import njit
 
 from ema.effects import HOOKS, registry
 
+from . import jit
 from .layout import row
 
-_inline = njit(forceinline=True, fastmath=True, error_model="numpy")
+_inline = njit(forceinline=True, fastmath=jit.FAST, error_model="numpy")
 
 
 def _bind(law: Callable[..., float], first: int, n: int) -> Any:

@@ -24,3 +24,7 @@ def equations_digest() -> str:
 
 
 numba.config.CACHE_DIR = str(Path(platformdirs.user_cache_dir("ema")) / f"kernels-{equations_digest()}")  # type: ignore[attr-defined]
+
+# What the compiler may do to floating-point arithmetic. Not `reassoc`: dt/J, known early, would become a division at
+# the end of the path that each step waits for.
+FAST = {"contract", "nnan", "ninf", "nsz", "arcp"}

@@ -21,9 +21,7 @@ from ema.effects.trapezoid import sector, six_step, trap
 from ema.effects.vector_math import TWO_PI, cos, sin
 
 from . import hf_kernel as m
-from . import (
-    jit,  # noqa: F401 - sets where kernels are cached
-)
+from . import jit
 from .actuator import Actuator
 from .envelope import smoothed
 from .hf import N_LANES, parameters, start_at
@@ -116,7 +114,7 @@ def electrical_step(z, l, N, dt):
     return K * i_next
 
 
-@njit(fastmath=True, error_model="numpy", cache=True, nogil=True)
+@njit(fastmath=jit.FAST, error_model="numpy", cache=True, nogil=True)
 def integrate(z, command, out, dt, n_substeps, lanes):
     """Run a batch of lanes over all ticks of `command` (n_ticks,); `out` (n_ticks, n_lanes) gets the current. [A]"""
     N = len(lanes)
