@@ -12,6 +12,7 @@ from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.conditions import as_recorded, current_noise, position_noise, supply_voltage
 from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.examine import examine
+from ema.discrepancy.actuator.zeros import zero_apart
 
 
 @pytest.fixture(scope="module")
@@ -109,3 +110,76 @@ def test_comparators_ten_times_as_coarse_are_a_condition_and_no_cause(hidden, sh
     assert findings.verdict == ("explained" if findings.effects else "adequate")
     assert any("evaluated every 10 µs" in note for note in findings.notes)
     assert findings.gain.k_after[2] == pytest.approx(0.05, abs=0.005)
+
+
+def examined(hidden, plant, bench, **flaws):
+    """Findings on four cycles of two motions."""
+    cycles = hidden.cycles(hidden.Flaws(**flaws), 4, 6, bench=bench)
+    return examine(plant, measured(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])).findings
+
+
+@pytest.mark.parametrize(("k2", "noise"), [(0.0, 4e-6), (0.2, 4e-6), (0.0, 4e-5)])
+@pytest.mark.parametrize("zero", [7.5e-6, -1e-4])
+def test_zeros_of_rotor_and_user_are_told_apart_in_the_middle_of_the_play(hidden, shipped_plant, zero, k2, noise):
+    bench = hidden.Bench(user_zero=zero, lvdt_noise=noise)
+    signals = prepared(shipped_plant, hidden.cycles(hidden.Flaws(k2=k2), 2, 12, bench=bench)).signals
+    assert zero_apart(shipped_plant, signals) == pytest.approx(-zero, abs=max(5e-7, noise / 15.0))
+
+
+def test_sound_sensors_and_a_gear_that_gives_have_no_zeros_apart(hidden, shipped_plant, cycles):
+    assert zero_apart(shipped_plant, prepared(shipped_plant, cycles).signals) == 0.0
+    soft = hidden.cycles(hidden.Flaws(compliance=2e-5, user_damping=10.0, load=4.0), 2, 13)
+    assert zero_apart(shipped_plant, prepared(shipped_plant, soft).signals) == 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("flaws", [{"k1": 0.04, "k3": 0.03}, {"k3": 0.03, "viscous": 6e-5}], ids=["faults", "drag"])
+def test_a_simulation_without_any_noise_is_a_record_too(hidden, shipped_plant, flaws):
+    """Runs without noise of the position switch in step with each other, but not with another simulator's."""
+    findings = examined(hidden, shipped_plant, hidden.Bench(current_noise=0.0, lvdt_noise=0.0), **flaws)
+    assert [e.name for e in findings.effects] == ["viscous_drag"] * ("viscous" in flaws)
+    assert findings.verdict == ("explained" if findings.effects else "adequate")
+    assert findings.gain.k_after[2] == pytest.approx(0.03, abs=3e-3)
+
+
+@pytest.mark.slow
+def test_a_zero_of_the_position_sensor_is_a_condition_and_no_cause(hidden, shipped_plant):
+    """It had been called a commutation offset of 0.09 rad, and taken a quarter of a short."""
+    findings = examined(hidden, shipped_plant, hidden.Bench(user_zero=1e-4), k1=0.04, k3=0.03)
+    assert findings.verdict == "adequate"
+    assert any("apart in the middle of the play" in note for note in findings.notes)
+    assert findings.gain.k_after == pytest.approx((0.04, 0.0, 0.03, 0.0, 0.0, 0.0), abs=3e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("angle", "apart"), [(0.05, 0.0), (-0.075, 0.0), (0.05, 0.05)], ids=["resolver", "resolver, back", "drive"]
+)
+def test_commutation_is_off_whether_the_recorded_angle_is_or_not(hidden, shipped_plant, angle, apart):
+    """A drive may commutate by another sensor than the recorded one; the torque dips alike to either side."""
+    findings = examined(hidden, shipped_plant, hidden.BENCH, commutation=angle, commutation_apart=apart)
+    assert [e.name for e in findings.effects] == ["commutation_offset"]
+    found = findings.effects[0].parameters
+    assert found["angle"].value == pytest.approx(angle, rel=0.1)
+    if "apart" in found:
+        assert found["apart"].value == pytest.approx(apart, abs=2e-3)
+    assert max(findings.gain.k_after) < 5e-3
+
+
+@pytest.mark.slow
+def test_the_torque_tells_a_small_commutation_offset_from_a_zero_of_the_position_sensor(hidden, shipped_plant):
+    """Zeros lie as far apart in both records; where it is the resolver's, the torque dips at every commutation."""
+    findings = examined(hidden, shipped_plant, hidden.BENCH, commutation=0.035)
+    assert [e.name for e in findings.effects] == ["commutation_offset"]
+    assert findings.effects[0].parameters["angle"].value == pytest.approx(0.035, rel=0.05)
+    assert examined(hidden, shipped_plant, hidden.Bench(user_zero=-3.5e-5)).verdict == "adequate"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("flaws", [{"k1": 0.04, "k3": 0.03}, {"k3": 0.03, "viscous": 6e-5}], ids=["faults", "drag"])
+def test_a_recorder_with_the_command_a_sample_late_is_a_condition_and_no_cause(hidden, shipped_plant, flaws):
+    findings = examined(hidden, shipped_plant, hidden.Bench(command_late=1), **flaws)
+    assert [e.name for e in findings.effects] == ["viscous_drag"] * ("viscous" in flaws)
+    assert findings.verdict == ("explained" if findings.effects else "adequate")
+    assert any("1 sample late" in note for note in findings.notes)
+    assert findings.gain.k_after[2] == pytest.approx(0.03, abs=3e-3)

@@ -36,6 +36,7 @@ class Flaws(NamedTuple):
     source_resistance: float = 0.0  # [ohm], DC link of 2 mF instead of a first-order lag
     saturation_current: float = 0.0  # [A] κ and L fall as tanh(i/i_s)/(i/i_s); 0: never
     commutation: float = 0.0  # [rad electrical]
+    commutation_apart: float = 0.0  # [rad electrical] the part of it that the recorded rotor angle does not have
     # mechanics
     viscous: float = 0.0  # [N m s/rad]
     quadratic: float = 0.0  # [N m s²/rad²]
@@ -94,6 +95,8 @@ class Bench(NamedTuple):
     lvdt_noise: float = 4e-6  # [rad] rms
     substeps: int = 100  # integration steps in a control tick
     position: float = 0.0  # [rad] at the user, around which everything moves
+    user_zero: float = 0.0  # [rad] what the user's sensor shows at zero; commands are by this sensor
+    command_late: int = 0  # 1: the recorder writes the state at the end of a tick beside the command of its beginning
 
 
 BENCH = Bench()
@@ -167,7 +170,7 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
             + f.once_sine * math.sin(theta)
             + f.twice_cosine * math.cos(2.0 * theta)
             + f.twice_sine * math.sin(2.0 * theta)
-            + f.commutation / p
+            + (f.commutation - f.commutation_apart) / p
         )
         seen_w = w + ((error - last_error) / T if tick > 0 else 0.0)
         last_error = error
@@ -298,11 +301,12 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
 def cycle(flaws: Flaws, command: np.ndarray, state: State, seed: int, bench: Bench = BENCH) -> dict[str, np.ndarray]:
     """One recorded cycle at 10 kHz; `state` is advanced. Channels by name."""
     rng = np.random.default_rng(seed)
-    n = len(command)
-    out = np.zeros((6, n))
+    n, late = len(command), bench.command_late
+    out = np.zeros((6, n + late))
     flaws = Flaws(*(float(x) for x in flaws))
+    acted = np.append(np.asarray(command, dtype=float), np.repeat(command[-1], late))
     _run(
-        *(flaws, np.ascontiguousarray(command, dtype=float), bench.lvdt_noise * rng.standard_normal(n)),
+        *(flaws, acted, bench.lvdt_noise * rng.standard_normal(n + late)),
         *(
             bench.substeps,
             10.0 * rng.random(),
@@ -315,6 +319,7 @@ def cycle(flaws: Flaws, command: np.ndarray, state: State, seed: int, bench: Ben
             out,
         ),
     )
+    out = np.ascontiguousarray(out[:, late:])
     i = np.clip(out[:3] + bench.current_noise * rng.standard_normal((3, n)), -flaws.adc_limit, flaws.adc_limit)
     step = 60.0 / 4096
     i = step * np.round(i / step)
@@ -323,8 +328,8 @@ def cycle(flaws: Flaws, command: np.ndarray, state: State, seed: int, bench: Ben
         "t": np.arange(n) * 1e-4,
         **dict(zip(names, i, strict=True)),
         "theta_m": out[3],
-        "theta_u": out[4],
-        "theta_cmd": np.array(command),
+        "theta_u": out[4] + bench.user_zero,
+        "theta_cmd": np.array(command) + bench.user_zero,
         "u_dc": out[5],
     }
 

@@ -25,6 +25,7 @@ from .weak import Torque, bumps, lines
 FLAT, FLAT_SAMPLES = 5e-3, 10  # [A] samples of one cycle at the largest current that make a clipped top
 CLIPPED_STEP = 0.05  # [A] of the finite difference of a converter's limit
 SIZES = (0.5, 1.0, 2.0, 4.0)  # times the step of a probe: usual sizes of an effect
+ZERO_KNOWN = 3e-7  # [rad at the user] to which a record tells how far the zeros of its sensors lie apart
 WARMER = 3.0  # [K] spread of winding temperature below which nothing can be said about temperature
 
 
@@ -155,6 +156,24 @@ class Line(Candidate):
         return {f"{self.effect}.{name}": value for name, value in found.items()}
 
 
+@dataclass(frozen=True)
+class Commutation(Candidate):
+    """A commutation that is off. The torque dips alike to either side, so its sign is taken from sensors that agree.
+
+    Attributes
+    ----------
+    recorded : float
+        What the recorded rotor angle is off by if the user's sensor is right. [rad electrical]
+    """
+
+    recorded: float = 0.0
+
+    def start(self, values: Array) -> Point:
+        """What the currents commutate against the recorded angle, and what that angle is off by."""
+        apart = values[self.linear.index("apart")]
+        return Candidate.start(self, np.array([apart + self.recorded, apart]))
+
+
 def _plain(effect: str, *names: str, step: Mapping[str, float] | None = None, **fixed: float) -> Candidate:
     """Linear in `names`; `fixed` are fitted too, from the given values."""
     parameters = {p.name: p for p in registry()[effect].parameters}
@@ -166,6 +185,23 @@ def _plain(effect: str, *names: str, step: Mapping[str, float] | None = None, **
     return Candidate(effect, tuple(frees), fixed, names, at)
 
 
+def _electrical(plant: Actuator, zero: float) -> float:
+    """An angle at the user as electrical angle. [rad]"""
+    return plant.motor.p * plant.transmission.GR * zero
+
+
+def resolver_zero(plant: Actuator, zero: float) -> Candidate:
+    """A commutation that is off by as much as the rotor's zero, if that is what lies apart by `zero`. [rad]"""
+    angle, reach = _electrical(plant, zero), _electrical(plant, ZERO_KNOWN)
+    frees = (Free("commutation_offset.angle", angle - reach, angle + reach, reach),)
+    return Candidate("commutation_offset", frees, {}, ("angle",), (angle,))
+
+
+def _commutation(plant: Actuator, zero: float) -> Candidate:
+    c = _plain("commutation_offset", "angle", "apart")
+    return Commutation(c.effect, c.frees, c.fixed, c.linear, c.steps, _electrical(plant, zero))
+
+
 def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line: str = "cogging") -> list[Candidate]:
     """What to try on these cycles; nonlinear parameters where the residual torque suggests them.
 
@@ -175,7 +211,7 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line:
         _plain("asymmetric_friction", "asymmetry"),
         _plain("clock_skew", "rate", step={"rate": 1e-4}),
         _plain("clock_skew", "shared", step={"shared": 5e-4}),
-        _plain("commutation_offset", "angle"),
+        _commutation(plant, data.zero),
         _plain("constant_load", "torque"),
         _plain("current_gain", "gain_a", "gain_b", "gain_c", step=dict.fromkeys(("gain_a", "gain_b", "gain_c"), 0.02)),
         _plain("current_offset", "offset_a", "offset_b", "offset_c"),

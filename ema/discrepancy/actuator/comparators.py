@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .fit import N_SEEDS, SEED, residuals
+from .fit import excess_at
 from .noise import Noise
 from .plant import NOISE_STEPS, STEPS, EmaPlant, Point
 
@@ -23,13 +23,9 @@ PLAIN = 0.3  # the same where effects have not been looked for: no other flaw go
 
 def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int], share: float) -> float | None:
     """The integration step with which `point` leaves less than a share of what is left now, None without one. [s]"""
-
-    def excess(steps: tuple[float, ...] | None) -> float:
-        left = residuals(plant, noise, point, cycles, plant.n_seeds(cycles, N_SEEDS), SEED, steps)
-        return max(noise.misfit(list(left.values()), cycles) - 1.0, 0.0)
-
-    now = excess(None)
-    left = {step: excess((step,)) for step in (_dividing(plant, about) for about in TRIED)}
+    now = excess_at(plant, noise, point, cycles)
+    tried = [_dividing(plant, about) for about in TRIED]
+    left = {step: excess_at(plant, noise, point, cycles, (step,)) for step in tried}
     best = max(step for step, x in left.items() if x < min(left.values()) + FELT)  # the coarser, the cheaper
     return best if left[best] < min(share * now, now - FELT) else None
 

@@ -20,6 +20,7 @@ SECOND_DIFFERENCE = np.sqrt(6.0)  # rms of x[t] - 2 x[t-1] + x[t-2] over that of
 SMOOTH = 101  # samples over which a user position is taken as straight but for noise
 SUPPLY_MEAN = 5e-3  # [s]
 SUPPLY_TOLERANCE = 2e-3  # of the plant file's voltage
+DITHER = 0.13  # of a step of the LVDT, rms; runs with less noise switch in step with each other, not with a record
 SEED = 20_260_101
 N_BISECTIONS = 30
 
@@ -82,18 +83,19 @@ def supply_voltage(plant: Actuator, signals: Sequence[Signals]) -> float | None:
 def as_recorded(plant: Actuator, signals: Sequence[Signals]) -> tuple[Actuator, list[str]]:
     """The plant under the conditions of the records where these are others, and what to tell a reader of them."""
     sensors = plant.sensors
-    noise = {"current_noise": (current_noise(plant, signals), sensors.adc_step, "A")}
+    noise = {"current_noise": (current_noise(plant, signals), sensors.adc_step, "A", 0.0)}
     position = position_noise(plant, signals)
     if position is not None:
-        noise["lvdt_noise"] = position, sensors.lvdt_step, "rad"
+        noise["lvdt_noise"] = position, sensors.lvdt_step, "rad", DITHER * sensors.lvdt_step
     other, notes = {}, []
-    for name, (value, step, unit) in noise.items():
+    for name, (value, step, unit, least) in noise.items():
         stated = getattr(sensors, name)
         unseen = 0.1 * step  # less than that makes no difference after the converter
         if not (stated + unseen) / WITHIN < value + unseen < (stated + unseen) * WITHIN:
-            other[name] = value if value > unseen else 0.0
+            seen = value if value > unseen else 0.0
+            other[name] = max(seen, least)
             notes.append(
-                f"sensors.{name} is {other[name]:.2g} {unit} rms in the records, {stated:.2g} {unit} in the plant file"
+                f"sensors.{name} is {seen:.2g} {unit} rms in the records, {stated:.2g} {unit} in the plant file"
             )
     inverter, V_dc = plant.inverter, supply_voltage(plant, signals)
     if V_dc is not None and abs(V_dc / inverter.V_dc - 1.0) > SUPPLY_TOLERANCE:

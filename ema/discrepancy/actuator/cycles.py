@@ -15,6 +15,7 @@ from ema.models.envelope import envelope
 from ema.models.turns import nearest_turn
 
 from .features import Array, Signals, features, motor_torque, stacked
+from .zeros import zero_apart
 
 REQUIRED = ("t", "i_a", "i_b", "i_c", "theta_m", "theta_u", "theta_cmd")
 T_20 = 20.0  # [°C] temperature of the nominal parameters
@@ -63,6 +64,8 @@ class Measured:
         Resolution of the recorded rotor angle, 0 if finer than can be seen. [rad]
     angle_noise : float
         White noise of the recorded rotor angle, 0 if less than its motion hides. [rad rms]
+    zero : float
+        θ_m/GR less θ_u in the middle of the play, 0 if not clear. [rad]
     """
 
     labels: tuple[str, ...]
@@ -79,6 +82,7 @@ class Measured:
     has_temperature: bool
     angle_step: float
     angle_noise: float
+    zero: float
 
     @property
     def n_cycles(self) -> int:
@@ -132,6 +136,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
         with_temperature,
         _step(np.concatenate([cycle["theta_m"] for _, cycle in everything])),
         _white_noise([s.theta_m[0] for s in signals]),
+        zero_apart(plant, signals),
     )
 
 

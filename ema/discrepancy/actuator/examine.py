@@ -14,6 +14,7 @@ from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
 from ema.effects import registry
 from ema.models.actuator import Actuator
 
+from .candidates import resolver_zero
 from .comparators import CLEAR, PLAIN, find_step, take_step
 from .conditions import as_recorded
 from .cycles import Measured
@@ -23,6 +24,7 @@ from .noise import N_RUNS_SURE, Noise, Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
 from .select import CHANCE, FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, Model, Search, start_model
 from .structure import structure
+from .timing import samples_late
 
 MIN_CYCLES = 2
 IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
@@ -36,7 +38,6 @@ DISTANT = 10.0  # excess of a model that is far from the data
 ALIKE = 0.6  # share by which two models may leave more or less and be alike: laws are approximations
 NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
 CLOSE = 0.5  # share of what was left, from which another turn is not worth it
-SURE = 0.1  # gain in misfit from which an effect is preferred to faults that explain a record just as simply
 SAME = 0.05  # difference in held-out misfit up to which fewer causes are preferred
 NEARLY = 0.5  # excess of a model that may be the right one but for switching
 NEAR, N_OWN = 1.0, 3  # excess up to which so many models are weighed by noise of their own
@@ -61,13 +62,14 @@ class Examination:
 
 @dataclass(frozen=True)
 class Path:
-    """One way through the search: with what noise, at which step of the comparators, from where to where.
+    """One way through the search: with what noise, step of the comparators and command, from where to where.
 
     `alike` holds, for each effect of `after`, what does as well in its place.
     """
 
     noise: Noise
     step: float | None
+    late: int
     tried: list[Model]
     before: Model
     verdict_before: Verdict
@@ -79,7 +81,8 @@ class Path:
     def of(cls, search: Search, model: Model) -> Path:
         """The beginning, where nothing is explained yet."""
         v = search.verdict(model)
-        return cls(search.noise, search.plant.step, list(search.tried), model, v, model, v, [])
+        plant = search.plant
+        return cls(search.noise, plant.step, plant.late, list(search.tried), model, v, model, v, [])
 
 
 def split(data: Measured) -> tuple[list[int], list[int]]:
@@ -111,6 +114,7 @@ def examine(
     path = _shortest(search, _faults_only(search))
     search.noise, search.tried = path.noise, path.tried
     take_step(ema, path.step)
+    ema.late = path.late
     before, alike = path.before, path.alike
     after, v = settled, _ = _settled(search, path.after, path.verdict)
     if not path.verdict_before.is_noise:
@@ -119,10 +123,16 @@ def examine(
     if after is not settled:
         after, v = _settled(search, after, v)
     after, v = _without_doubtful(search, after, v, alike)
+    after, v = _with_zero(search, after, v, alike)
     alike = [_still_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
     findings = _findings(search, before, after, v, alike)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
         findings, after = _with_function(search, findings, before, after)
+    if ema.late:
+        side, samples = "late" if ema.late > 0 else "early", "sample" if abs(ema.late) == 1 else "samples"
+        conditions.append(f"the recorded command is {abs(ema.late)} {samples} {side} against the other channels")
+    if data.zero:
+        conditions.append(f"θ_m/GR and θ_u are {data.zero:.2g} rad apart in the middle of the play")
     if path.step:
         conditions.append(f"the comparators of the record switch as if evaluated every {1e6 * path.step:g} µs")
     findings.notes.extend(conditions)
@@ -136,6 +146,10 @@ def _faults_only(search: Search) -> list[Path]:
     without faults, or what they make of it: friction or drag, whatever their cause, change it hundredfold.
     """
     model = start_model(search)
+    late = samples_late(search.plant, search.noise, model.fit.point, search.train) if model.excess > NEARLY else 0
+    if late:
+        search.plant.late = late
+        model = start_model(search)
     nominal = Path.of(search, model)
     if nominal.verdict.is_noise and max(model.fit.point.get(name, 0.0) for name in FAULTS) < FAULT_ALARM:
         return [nominal]
@@ -168,21 +182,23 @@ def _gone(search: Search, begun: Path) -> Path:
     """A path to its end: what explains the cycles."""
     search.noise, search.tried = begun.noise, list(begun.tried)
     take_step(search.plant, begun.step)
+    search.plant.late = begun.late
     before, verdict_before = _surely(search, begun.before, begun.verdict)
     if not verdict_before.is_noise:
-        before, verdict_before = _with_other_step(search, before, verdict_before, PLAIN)
+        before, verdict_before = _as_on_the_bench(search, before, verdict_before, PLAIN)
     search.say(f"faults only: p = {verdict_before.p_value:.2g}, most visible: {verdict_before.loudest}")
     alike: list[tuple[str, ...]] = []
     after, v = _grown(search, before, before, verdict_before, alike)
     if not v.is_noise:  # the library had its chance
-        other, w = _with_other_step(search, after, v)
+        other, w = _as_on_the_bench(search, after, v)
         if other is not after:
             if after is before:
                 before, verdict_before = other, w
             after, v = _grown(search, before, other, w, alike)
     if verdict_before.is_noise:
         after, v = _simpler(search, after, v, alike)
-    return Path(search.noise, search.plant.step, search.tried, before, verdict_before, after, v, alike)
+    plant = search.plant
+    return Path(search.noise, plant.step, plant.late, search.tried, before, verdict_before, after, v, alike)
 
 
 def _grown(
@@ -205,13 +221,13 @@ def _grown(
         if after.excess < NEW_NOISE * left:  # what runs differ by depends on the point, and so does every weight
             left = max(after.excess, CHANCE)
             search.noise = Noise(search.plant, after.fit.point)
-            after, *rivals = [
-                search.model(m.effects, m.fit.free, m.fit.point, m.fit.columns, 2) for m in (after, *rivals)
-            ]
+            near = [m for m in real if m in (after, *rivals) or m.excess < NEARLY]
+            near = [search.model(m.effects, m.fit.free, m.fit.point, m.fit.columns, 2) for m in near]
+            after, *rivals = sorted(near, key=lambda m: m.heldout)
         alike.append(tuple(m.names[-1] for m in rivals if _is_alike(m, after)))
         after, v = _surely(search, after, search.verdict(after))
         if not v.is_noise:
-            after, v = _with_other_step(search, after, v, PLAIN)
+            after, v = _as_on_the_bench(search, after, v, PLAIN)
         if not v.is_noise:
             after, v = _settled(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
@@ -249,11 +265,19 @@ def _surely(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
         return model, v
     search.noise = Noise(search.plant, model.fit.point, N_RUNS_SURE)
     v = search.verdict(model)
-    return (model, v) if v.is_noise else _with_other_step(search, model, v, PLAIN)
+    return (model, v) if v.is_noise else _as_on_the_bench(search, model, v, PLAIN)
 
 
-def _with_other_step(search: Search, model: Model, v: Verdict, share: float = CLEAR) -> tuple[Model, Verdict]:
-    """`model` on the grid on which the comparators of the record seem to switch, if that is another than ours."""
+def _as_on_the_bench(search: Search, model: Model, v: Verdict, share: float = CLEAR) -> tuple[Model, Verdict]:
+    """`model` with the command and the grid of the comparators that the record seems to have, if others than ours."""
+    late = samples_late(search.plant, search.noise, model.fit.point, search.train)
+    if late:
+        search.plant.late = late
+        model = search.model(model.effects, model.fit.free, model.fit.point, None, 3)
+        v = search.verdict(model)
+        search.say(f"command {late:+d} samples late: p = {v.p_value:.2g}")
+        if v.is_noise:
+            return model, v
     step = find_step(search.plant, search.noise, model.fit.point, search.train, share)
     if step is None:
         return model, v
@@ -268,7 +292,7 @@ def _with_other_step(search: Search, model: Model, v: Verdict, share: float = CL
 def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
     """`model`, or where it leaves little, one with an effect for several faults that leaves no more.
 
-    With no fewer parameters than `model` it must leave less, and clearly so where faults need no effect beside them.
+    With no fewer parameters than `model` it must leave less.
     What runs differ by depends on the model too, so either is weighed by the noise of both.
     """
     if not v.is_noise and model.excess > NEARLY:
@@ -283,7 +307,7 @@ def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ..
         more = search.left_more(m, model, (here, search.noise))
         w = search.verdict(m)
         fewer = len(m.fit.free) < len(model.fit.free)
-        if more < (SAME if fewer else -CHANCE if model.effects else -SURE) and (w.is_noise or not v.is_noise):
+        if more < (SAME if fewer else -CHANCE) and (w.is_noise or not v.is_noise):
             as_good.append((more, m, w, search.noise))
     search.noise = here
     if not as_good:
@@ -327,6 +351,24 @@ def _without_doubtful(search: Search, model: Model, v: Verdict, alike: list[tupl
             model, v = reduced, search.verdict(reduced)
             search.say(f"{effect.effect} may be nothing: p = {v.p_value:.2g}")
     return model, v
+
+
+def _with_zero(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+    """`model` with a commutation that is off with the resolver's zero, if that does at least as well.
+
+    What lies within a step of the user's sensor needs no cause.
+    """
+    zero = search.plant.data.zero
+    if not v.is_noise or "commutation_offset" in model.names or abs(zero) < search.plant.plant.sensors.lvdt_step:
+        return model, v
+    c = resolver_zero(search.plant.plant, zero)
+    made = search.model((*model.effects, c), (*model.fit.free, *c.frees), {**model.fit.point, **c.probes()[0]}, None, 2)
+    w = search.verdict(made)
+    more = search.left_more(made, model, (search.noise,))
+    if not w.is_noise or more > SAME:
+        return model, v
+    alike.append(("a zero of theta_u",) if more > -SAME else ())
+    return made, w
 
 
 def _settled(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:

@@ -52,6 +52,7 @@ class EmaPlant:
         self.step: float | None = None  # the one step that a record seems to have, where it was asked
         self.steps: tuple[float, ...] = STEPS
         self.noise_steps: tuple[float, ...] = NOISE_STEPS
+        self.late = 0  # samples by which the recorded command is late against the other channels
         self.n_motions = len(data.commands)
         self.first = [int(np.flatnonzero(data.motion == m)[0]) for m in range(self.n_motions)]
         groups = [features(plant, data.signals[c]) for c in self.first]
@@ -88,14 +89,15 @@ class EmaPlant:
 
     def _simulate(self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], dt: float) -> Runs:
         d, n = self.data, len(points)
-        command = np.array([d.commands[d.motion[c]] for c in cycles])
+        zero_error = self._zero_error(points)
+        zero = d.zero - zero_error / self.plant.transmission.GR  # of the user's sensor, if the rotor's is off by that
+        command = np.array([d.commands[d.motion[c]] for c in cycles]) + zero[:, None]
         k = np.array([[point.get(name, 0.0) for name in FAULTS] for point in points])
         effects = self._effects(points)
         cycles_ = np.asarray(cycles)
         unseen = self.plant.sensors.lvdt_step * np.array([np.random.default_rng(s).random() - 0.5 for s in seeds])
-        start = hf.start_at(
-            self.plant, d.start[cycles_, 0] + unseen, d.start[cycles_, 1] - self._angle_error(points, cycles_)
-        )
+        theta_m = d.start[cycles_, 1] - zero_error - self._wobble(points, cycles_)
+        start = hf.start_at(self.plant, d.start[cycles_, 0] + zero + unseen, theta_m)
         start[:, STATE.index("w_m")] = d.speed[cycles_]
         start[:, STATE.index("w_u")] = d.user_speed[cycles_]
         for j, phase in enumerate("abc"):  # the current that held it before
@@ -107,7 +109,7 @@ class EmaPlant:
             r = hf.simulate(
                 self.plant,
                 k[part],
-                command[part],
+                _earlier(command[part], self.late),
                 seeds=np.asarray(seeds)[part],
                 start=start[part],
                 effects={e: {p: x[part] for p, x in values.items()} for e, values in effects.items()},
@@ -170,10 +172,17 @@ class EmaPlant:
                 given.setdefault(parameter, np.full(len(points), value))
         return effects
 
-    def _angle_error(self, points: Sequence[Point], cycles: np.ndarray) -> Array:
-        """What the resolver shows too much at the start of each run. [rad]"""
-        angle = np.array([p.get("commutation_offset.angle", self.neutral("commutation_offset.angle")) for p in points])
-        error = angle / self.plant.motor.p
+    def _zero_error(self, points: Sequence[Point]) -> Array:
+        """By how much the zero of the recorded rotor angle is off, for each run. [rad]"""
+        angle, apart = (
+            np.array([p.get(name, self.neutral(name)) for p in points])
+            for name in ("commutation_offset.angle", "commutation_offset.apart")
+        )
+        return np.asarray((angle - apart) / self.plant.motor.p)
+
+    def _wobble(self, points: Sequence[Point], cycles: np.ndarray) -> Array:
+        """What the resolver shows too much at the start of each run, beside its zero. [rad]"""
+        error = np.zeros(len(points))
         law = registry()["resolver_error"]
         names = [f"resolver_error.{p.name}" for p in law.parameters]
         if any(name in point for point in points for name in names) or "resolver_error" in self.plant.effects:
@@ -181,3 +190,9 @@ class EmaPlant:
                 values = [point.get(name, self.neutral(name)) for name in names]
                 error[run] += law.laws["angle_error"](float(self.data.start[cycle, 1]), *values)
         return np.asarray(error)
+
+
+def _earlier(x: Array, samples: int) -> Array:
+    """A signal (n, n_times) so many samples earlier; its ends are held."""
+    at = np.clip(np.arange(x.shape[1]) + samples, 0, x.shape[1] - 1)
+    return np.asarray(x[:, at])

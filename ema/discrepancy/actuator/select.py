@@ -53,6 +53,7 @@ CHANCE = 0.03  # difference in misfit that seeds make
 COLLINEAR = 0.8  # cosine from which two effects look like each other
 FAR = 100.0  # excess from which candidates are simulated before they are ranked
 NEARLY = 1.5  # misfit of a model that may be the right one, but for noise that is not its own
+NEARLY_ALL = 0.01  # share of what there was to explain, up to which a rival may still leave it for want of iterations
 NEAR_NOISE = 0.05  # excess below which a fit need not go on
 MAX_EFFECTS = 3
 
@@ -261,7 +262,9 @@ class Search:
         for s in self._looking_like(model, best, [s for s in screened if s.candidate.effect not in refined]):
             if s.candidate.effect not in refined:
                 refined[s.candidate.effect] = self._refined(model, s)
-        for name, m in self._close(refined):  # a rival is out only if it leaves more when fitted as well as the best
+        for name, m in self._close(
+            refined, model
+        ):  # a rival is out only if it leaves more when fitted as well as the best
             again = self.model(m.effects, m.fit.free, m.fit.point, None, 4)
             refined[name] = min(m, again, key=lambda x: x.heldout)
         return sorted(refined.values(), key=lambda m: m.heldout)
@@ -335,11 +338,13 @@ class Search:
             ranked.append(Screened(cost * least / here, s.candidate, of[best]))
         return sorted(ranked, key=lambda entry: entry.promised)
 
-    def _close(self, refined: dict[str, Model]) -> list[tuple[str, Model]]:
-        """The models near the best; none if the best stands alone and leaves nothing."""
+    def _close(self, refined: dict[str, Model], model: Model) -> list[tuple[str, Model]]:
+        """The models near the best, by what there was to explain too; none if the best stands alone without a rest."""
         ranked = sorted(refined.items(), key=lambda item: item[1].heldout)
         best = ranked[0][1]
-        near = [(name, m) for name, m in ranked[:3] if m.excess < 2.0 * best.excess + 0.2]
+        near = [
+            (name, m) for name, m in ranked[:3] if m.excess < max(2.0 * best.excess + 0.2, NEARLY_ALL * model.excess)
+        ]
         return near if len(near) > 1 or best.excess > NEAR_NOISE else []
 
     def _refined(self, model: Model, s: Screened) -> Model:

@@ -1,0 +1,56 @@
+"""How far the zeros of the rotor's and the user's sensor lie apart: a condition of the bench, by itself no flaw.
+
+In the middle of the play θ_m/GR = θ_u. Two sensors never agree on their zero that well: a step of the LVDT is half a
+degree of the electrical angle. If it is the resolver that is off, and the drive commutates by it, then the commutation
+is off too (the effect `commutation_offset`); which of them it is only the torque can tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ema.models.actuator import Actuator
+
+from .conditions import roughness
+from .features import Array, Signals
+
+CLOSED = 0.5  # [rad] of the rotor after it has turned round, from where the play is taken up
+STIFF = 1.5  # times the noise of θ_u that θ_m/GR - θ_u may vary by while the play is closed, with a stiff gear
+ENOUGH = 100  # samples on either side of the play
+SEEN = 2e-6  # [rad at the user] less makes no difference
+MOVING = 2.0  # [rad/s]
+DIFFERENCE = 20  # samples over which the speed is taken
+
+
+def zero_apart(plant: Actuator, signals: Sequence[Signals]) -> float:
+    """θ_m/GR less θ_u in the middle of the play; 0 if not clear of 0, or if a gear that gives leaves it open. [rad]"""
+    sides: tuple[list[Array], list[Array]] = ([], [])
+    for s in signals:
+        d = s.theta_m[0] / plant.transmission.GR - s.theta_u[0]
+        way = _way(s.theta_m[0], plant.control.rate)
+        for side, sign in zip(sides, (1.0, -1.0), strict=True):
+            side.append(d[sign * way > CLOSED])
+    forth, back = (np.concatenate(side) for side in sides)
+    if min(len(forth), len(back)) < ENOUGH:
+        return 0.0
+    middle = 0.5 * float(np.median(forth) + np.median(back))
+    stated = float(np.hypot(plant.sensors.lvdt_noise, plant.sensors.lvdt_step / np.sqrt(12.0)))
+    noise = max(stated, *(roughness(s.theta_u) for s in signals))
+    varies = float(np.sqrt(0.5 * (forth.var() + back.var())))
+    return middle if varies < STIFF * noise and abs(middle) > SEEN else 0.0
+
+
+def _way(theta_m: Array, rate: float) -> Array:
+    """How far the rotor has gone since it last turned round, with the sign of its direction. [rad]"""
+    w_m = np.zeros(len(theta_m))
+    w_m[DIFFERENCE:] = (theta_m[DIFFERENCE:] - theta_m[:-DIFFERENCE]) * rate / DIFFERENCE
+    direction = np.where(np.abs(w_m) > MOVING, np.sign(w_m), 0.0)
+    at = np.maximum.accumulate(np.where(direction != 0.0, np.arange(len(w_m)), 0))
+    direction = direction[at]  # held while at rest
+    turned = np.flatnonzero(np.diff(direction, prepend=direction[0]) != 0.0)
+    since = np.zeros(len(w_m), dtype=int)
+    since[turned] = turned
+    since = np.maximum.accumulate(since)
+    return np.asarray(direction * np.abs(theta_m - theta_m[since]))
