@@ -1,6 +1,6 @@
 """Run a command beside a real SocketCAN interface vcan0: on this kernel if it has one, else inside User-Mode Linux.
 
-    python tools/on_vcan.py [--timeout 900] .venv/bin/pytest -m vcan tests/vcan
+    python tools/on_vcan.py [--timeout 1800] .venv/bin/pytest -m vcan tests/vcan
 
 Output and exit status are the command's. The interface is private to the command: this kernel's own vcan0, if there is
 one, is not touched. The command runs in the present directory, sees this machine's files and has a root's rights over
@@ -24,7 +24,7 @@ NATIVE = ["unshare", *([] if os.geteuid() == 0 else ["--map-root-user"]), "--net
 def main() -> int:
     """Read the arguments, choose the kernel, run."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--timeout", type=float, default=900, help="hard end [s]")
+    parser.add_argument("--timeout", type=float, default=1800, help="hard end [s]")
     parser.add_argument("command", nargs=argparse.REMAINDER)
     arguments = parser.parse_args()
     reason = why_not_native()
