@@ -13,10 +13,17 @@ def comparator(s_j, error_j, h):
 
 
 @njit(inline="always")
-def leg_voltage(s_j, i_j, u_dc, off_share):
+def leg_voltage(s_j, i_j, u_dc, late_share, off_share):
     """Voltage of a leg against the middle of the DC bus.   [V]
 
-    While both switches are off (dead time, for `off_share` of the step) the current chooses the diode.
+    For `late_share` of the step the leg is still as it was before its comparator turned to s_j. While both switches are
+    off (dead time, for `off_share` of the step) the current chooses the diode.
     """
     diode = -1.0 if i_j > 0.0 else 1.0
-    return 0.5 * u_dc * (s_j + off_share * (diode - s_j))
+    return 0.5 * u_dc * (s_j - 2.0 * late_share * s_j + off_share * (diode - s_j))
+
+
+@njit(inline="always")
+def share_of_step(time, dt):
+    """What a time from the beginning of a step takes of it."""
+    return min(max(time / dt, 0.0), 1.0)

@@ -91,6 +91,7 @@ def parameters(plant: Actuator, k: np.ndarray, effects: Effects, dT: float | np.
         for parameter_name, value in values.items():
             z[row(f"{name}.{parameter_name}")] = value
     z[row("J_m")] *= 1.0 + z[row("inertia.change")]
+    z[row("f_lag")] /= 1.0 + z[row("current_filter.change")]
     return z
 
 

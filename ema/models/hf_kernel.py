@@ -12,7 +12,7 @@ from numba import njit
 
 from ema.effects.backlash import deflection, follow
 from ema.effects.dry_friction import speed_after
-from ema.effects.inverter import comparator, leg_voltage
+from ema.effects.inverter import comparator, leg_voltage, share_of_step
 from ema.effects.trapezoid import sector, six_step, trap
 from ema.effects.vector_math import TWO_PI, cos, sin
 
@@ -36,7 +36,7 @@ E_ELECTRIC, E_COPPER, E_SHAFT, E_FRICTION, E_USER = map(
     row, ("E_electric", "E_copper", "E_shaft", "E_friction", "E_user")
 )
 COMPLIANCE, INERTIA, DAMPING = (row(f"gear_compliance.{x}") for x in ("compliance", "inertia", "damping"))
-SOURCE_R, DEAD_TIME = map(row, ("supply_sag.resistance", "dead_time.time"))
+SOURCE_R, DEAD_TIME, DELAY = map(row, ("supply_sag.resistance", "dead_time.time", "comparator_delay.time"))
 COMMUTATION, APART = map(row, ("commutation_offset.angle", "commutation_offset.apart"))
 GAIN_A, GAIN_B, GAIN_C = (row(f"current_gain.gain_{j}") for j in "abc")
 OFFSET_A, OFFSET_B, OFFSET_C = (row(f"current_offset.offset_{j}") for j in "abc")
@@ -96,13 +96,19 @@ def electrical_step(z, l, N, dt, parts, audited):
     s_c = comparator(z[S_C * N + l], I_ref * six_step(n + 2.0) - x_c, h)
     if len(parts) & INVERTER:
         dead = z[DEAD_TIME * N + l]
-        off_a = dead if s_a != z[S_A * N + l] else z[OFF_A * N + l]
-        off_b = dead if s_b != z[S_B * N + l] else z[OFF_B * N + l]
-        off_c = dead if s_c != z[S_C * N + l] else z[OFF_C * N + l]
+        on = z[DELAY * N + l] + dead  # from a comparator's decision until the leg is on again
+        off_a = on if s_a != z[S_A * N + l] else z[OFF_A * N + l]
+        off_b = on if s_b != z[S_B * N + l] else z[OFF_B * N + l]
+        off_c = on if s_c != z[S_C * N + l] else z[OFF_C * N + l]
+        late_a, late_b, late_c = (
+            share_of_step(off_a - dead, dt),
+            share_of_step(off_b - dead, dt),
+            share_of_step(off_c - dead, dt),
+        )
         u_dc = z[U_DC * N + l]
-        v_a = leg_voltage(s_a, i_a, u_dc, min(off_a / dt, 1.0))
-        v_b = leg_voltage(s_b, i_b, u_dc, min(off_b / dt, 1.0))
-        v_c = leg_voltage(s_c, i_c, u_dc, min(off_c / dt, 1.0))
+        v_a = leg_voltage(s_a, i_a, u_dc, late_a, share_of_step(off_a, dt) - late_a)
+        v_b = leg_voltage(s_b, i_b, u_dc, late_b, share_of_step(off_b, dt) - late_b)
+        v_c = leg_voltage(s_c, i_c, u_dc, late_c, share_of_step(off_c, dt) - late_c)
         z[OFF_A * N + l] = max(off_a - dt, 0.0)
         z[OFF_B * N + l] = max(off_b - dt, 0.0)
         z[OFF_C * N + l] = max(off_c - dt, 0.0)

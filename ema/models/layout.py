@@ -9,7 +9,7 @@ from __future__ import annotations
 from ema.effects import registry
 
 # What a run carries from one cycle into the next.
-# s_*: comparators, off_*: dead time left, lag1_*, lag2_*: anti-alias stages.
+# s_*: comparators, off_*: time until the leg is on, lag1_*, lag2_*: anti-alias stages.
 STATE = (
     *("i_a", "i_b", "i_c", "theta_m", "w_m", "theta_u", "w_u", "s_a", "s_b", "s_c", "off_a", "off_b", "off_c"),
     *("lag1_a", "lag1_b", "lag1_c", "lag2_a", "lag2_b", "lag2_c", "u_dc", "angle_error", "I_ref"),

@@ -32,6 +32,7 @@ OF_STRUCTURAL = {  # effects without laws that the kernel reads itself
     "speed_delay": SENSORS,
     "supply_sag": INVERTER,
     "dead_time": INVERTER,
+    "comparator_delay": INVERTER,
     "gear_compliance": GEAR,
 }
 

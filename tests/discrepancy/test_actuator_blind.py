@@ -94,3 +94,25 @@ def test_both_lines_of_cogging_are_found(hidden, shipped_plant):
     assert further.parameters["order"].value == pytest.approx(24.0, abs=0.1)
     assert further.parameters["amplitude"].value == pytest.approx(0.0024, rel=0.1)
     assert findings.gain.heldout_after < 1.2 * findings.gain.noise_floor
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("flaw", "effect", "parameter", "value"),
+    [
+        ({"reaction": 1.2e-6}, "comparator_delay", "time", 1.2e-6),
+        ({"corner": 1500.0}, "current_filter", "change", 2000.0 / 1500.0 - 1.0),
+    ],
+    ids=["comparators a step late", "slower filter of the recorder"],
+)
+def test_what_another_bench_does_with_the_currents_is_named_and_the_fault_stays(
+    hidden, shipped_plant, flaw, effect, parameter, value
+):
+    findings = examine(shipped_plant, measured(shipped_plant, [hide(hidden, 4, 2, k1=0.03, **flaw)])).findings
+    assert findings.verdict == "explained"
+    assert [(e.name, e.indistinguishable_from) for e in findings.effects] == [(effect, ())]
+    found = findings.effects[0].parameters[parameter]
+    assert found.value == pytest.approx(value, rel=0.1)
+    assert found.low < value < found.high
+    assert findings.gain.k_after == pytest.approx((0.03, 0.0, 0.0, 0.0, 0.0, 0.0), abs=3e-3)
+    assert findings.gain.heldout_after < 1.2 * findings.gain.noise_floor

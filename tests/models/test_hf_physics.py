@@ -241,3 +241,24 @@ def test_effects_act_on_their_own_runs_only():
     np.testing.assert_array_equal(together.i[1], alone.i[1])
     assert np.abs(together.i[1] - plain.i[1]).max() > 0.1
     assert np.abs(together.u_dc[2] - plain.u_dc[2]).max() > 0.1
+
+
+def test_a_slower_anti_alias_filter_is_one_of_lower_corner_and_changes_nothing_else():
+    slower = hf.simulate(PLANT, np.zeros(6), seeds=1, effects={"current_filter": {"change": 1.0}})
+    lower = hf.simulate(varied(sensors={"f_lag": 0.5 * PLANT.sensors.f_lag}), np.zeros(6), seeds=1)
+    assert np.array_equal(slower.i, lower.i)
+    assert np.array_equal(slower.theta_m, hf.simulate(PLANT, np.zeros(6), seeds=1).theta_m)
+
+
+def test_late_comparators_let_the_current_leave_the_band_by_what_it_moves_meanwhile():
+    """Overshoot of a held motor's current over the band: less than slope x delay, with the whole supply across L."""
+    held = varied(control={"rate": 1e5}, sensors={"f_lag": 1e5}, transmission={"F_s": 10.0, "F_d": 9.0})
+    command = np.full(20_000, 0.002)  # the controller asks for 6 A
+
+    def highest(delay: float) -> float:
+        r = hf.simulate(held, np.zeros(6), command, noise=False, effects={"comparator_delay": {"time": delay}})
+        return float(np.abs(r.i[0, :, 1000:]).max() - abs(r.I_ref[0, -1]))
+
+    slope = held.inverter.V_dc / held.motor.L
+    none, half, one, three = map(highest, (0.0, 0.5e-6, 1e-6, 3e-6))
+    assert none < half < one < three < none + 3e-6 * slope

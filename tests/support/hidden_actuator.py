@@ -33,8 +33,10 @@ class Flaws(NamedTuple):
     flux: float = 0.0  # relative change
     resistance: float = 0.0  # relative change
     dead_time: float = 0.0  # [s]
+    reaction: float = 0.0  # [s] comparators see currents and references of that long ago
     source_resistance: float = 0.0  # [ohm], DC link of 2 mF instead of a first-order lag
     saturation_current: float = 0.0  # [A] κ and L fall as tanh(i/i_s)/(i/i_s); 0: never
+    corner: float = 2000.0  # [Hz] of the recorder's two anti-alias stages
     commutation: float = 0.0  # [rad electrical]
     commutation_apart: float = 0.0  # [rad electrical] the part of it that the recorded rotor angle does not have
     # mechanics
@@ -162,6 +164,7 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
     T = TICK * (1.0 + f.clock_skew)
     dt = T / substeps
     I_ref, last_error = 0.0, 0.0
+    wishes, at = np.zeros((64, 3)), 0
     draw, deaf = 0, -1
     for tick in range(n):
         theta, w, theta_u, w_u = mech[0], mech[1], mech[2], mech[3]
@@ -222,6 +225,11 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
                 if j == 0 and f.hum != 0.0:
                     x[j] += f.hum * math.sin(2.0 * math.pi * f.hum_frequency * now)
                 wish = I_ref * _commutated(seen - shift[j]) - x[j]
+                if f.reaction > 0.0:
+                    wishes[at % 64, j] = wish
+                    back = min(f.reaction / dt, 62.0)
+                    older, share = at - int(back) - 1, back - int(back)
+                    wish = (1.0 - share) * wishes[(older + 1) % 64, j] + share * wishes[older % 64, j]
                 previous = sw[j]
                 if wish > h:
                     sw[j] = 1.0
@@ -251,8 +259,9 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
             for j in range(3):
                 i[j] += dt * di[j]
                 torque += kappa[j] * i[j]
-                flt[0, j] += 2.0 * math.pi * 2000.0 * dt * (x[j] - flt[0, j])
-                flt[1, j] += 2.0 * math.pi * 2000.0 * dt * (flt[0, j] - flt[1, j])
+                flt[0, j] += 2.0 * math.pi * f.corner * dt * (x[j] - flt[0, j])
+                flt[1, j] += 2.0 * math.pi * f.corner * dt * (flt[0, j] - flt[1, j])
+            at += 1
             # the mechanics
             drive = torque - C * w - f.viscous * w - f.quadratic * abs(w) * w
             drive -= f.cogging * math.sin(f.cogging_order * theta + f.cogging_phase)
