@@ -10,10 +10,14 @@ k6    static eccentricity      ζ = k6
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 
 from ema.core.errors import ConfigError
 from ema.core.names import FAULTS
+
+V = TypeVar("V", float, np.ndarray)
 
 N_FAULTS = len(FAULTS)
 N_MIN = 0.02  # turns left of a completely shorted phase: no inductance at all would be no circuit
@@ -35,7 +39,7 @@ def friction(F: float, k1: np.ndarray) -> np.ndarray:
     return F * (1.0 + 3.0 * k1)
 
 
-def backlash(b: float, k2: np.ndarray) -> np.ndarray:
+def backlash(b: float, k2: V) -> V:
     """Half-width of the backlash.   b (1 + 100 k2)   [rad]"""
     return b * (1.0 + 100.0 * k2)
 

@@ -81,12 +81,19 @@ def test_another_integration_step_is_noise(hidden, shipped_plant, substeps):
     assert nothing_is_noise(shipped_plant, Record((Cycle(0, cycle),)))
 
 
-def test_a_resonating_gear_is_seen_in_rotor_and_user(hidden, shipped_plant):
-    command = hidden.chirp()
-    soft = hidden.cycle(hidden.Flaws(compliance=1.5e-5, user_damping=30.0), command, hidden.rest(), 1)
-    found = resonance(shipped_plant, measured(shipped_plant, [Record((Cycle(0, soft),))]))
+@pytest.mark.parametrize("k2", [0.0, 0.05])
+def test_a_resonating_gear_is_seen_in_rotor_and_user(hidden, shipped_plant, k2):
+    """With its backlash, and though the user still swings when a cycle begins."""
+    flaws = hidden.Flaws(compliance=1.5e-5, user_damping=30.0, k2=k2)
+    soft = hidden.cycles(flaws, 3, 1, motions=(hidden.chirp(),))
+    found = resonance(shipped_plant, measured(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(soft)))]))
     assert found is not None
-    assert found.compliance == pytest.approx(1.5e-5, rel=0.2)
-    assert found.inertia == pytest.approx(0.6, rel=0.2)
-    stiff = hidden.cycle(hidden.Flaws(), command, hidden.rest(), 1)
+    assert found.compliance * found.inertia == pytest.approx(1.5e-5 * 0.6, rel=0.02)
+    assert found.inertia == pytest.approx(0.6, rel=0.02)
+    assert found.damping == pytest.approx(15.0 * (1.5e-5 / 0.6) ** 0.5, rel=0.15)
+    assert found.k2 == pytest.approx(k2, abs=0.003)
+
+
+def test_a_stiff_gear_has_no_resonance(hidden, shipped_plant):
+    stiff = hidden.cycle(hidden.Flaws(), hidden.chirp(), hidden.rest(), 1)
     assert resonance(shipped_plant, measured(shipped_plant, [Record((Cycle(0, stiff),))])) is None

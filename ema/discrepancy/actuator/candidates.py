@@ -7,7 +7,7 @@ are the columns with which all candidates are screened at once, linearly. Only t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -110,9 +110,11 @@ class Candidate:
 class Seen(Candidate):
     """An effect that is plain to see in the record: a fit begins with what is seen there."""
 
+    faults_seen: Point = field(default_factory=dict)
+
     def start(self, values: Array) -> Point:
-        """The probe."""
-        return self.probes()[0]
+        """The probe, and faults that are seen beside it."""
+        return {**self.probes()[0], **self.faults_seen}
 
     def sizes(self) -> list[Point]:
         """None but what is seen."""
@@ -245,7 +247,8 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line:
     gear = resonance(plant, data)
     if gear is not None:
         step = {"compliance": gear.compliance}
-        found.append(_plain("gear_compliance", "compliance", step=step, inertia=gear.inertia, damping=gear.damping))
+        c = _plain("gear_compliance", "compliance", step=step, inertia=gear.inertia, damping=gear.damping)
+        found.append(Seen(c.effect, c.frees, c.fixed, c.linear, c.steps, {"k2": gear.k2}))
     for order, _ in lines(torques):
         frees = (
             free(f"{line}.amplitude", 0.002),

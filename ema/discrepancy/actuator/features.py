@@ -136,13 +136,17 @@ def _table(i: Array, sector: Array, sign: Array) -> Array:
     return total
 
 
+def current_lag(plant: Actuator) -> float:
+    """Samples by which the two anti-alias stages make the recorded currents late."""
+    return 2.0 / (2.0 * np.pi * plant.sensors.f_lag) * plant.control.rate
+
+
 def motor_torque(plant: Actuator, signals: Signals) -> tuple[Array, Array]:
     """Nominal torque Σ κ_j i_j (n, n_times), and electrical angles by phase (n, 3, n_times). [N m, rad]
 
     The angle is taken as late as the anti-alias stages make the current.
     """
-    lag = 2.0 / (2.0 * np.pi * plant.sensors.f_lag) * plant.control.rate
-    theta_e = plant.motor.p * delayed(signals.theta_m, lag)[:, None, :] - PHASE
+    theta_e = plant.motor.p * delayed(signals.theta_m, current_lag(plant))[:, None, :] - PHASE
     return (plant.motor.k_e * _trap(theta_e) * signals.i).sum(axis=1), theta_e
 
 
@@ -157,7 +161,7 @@ def features(plant: Actuator, signals: Signals) -> dict[str, Array]:
     i_q = 0.5 * (_six_step(theta_e) * signals.i).sum(axis=1)
     c, limit = plant.control, plant.inverter.I_max
     I_ref = np.clip(c.K_w * (c.K_p * (signals.theta_cmd - signals.theta_u) - w_m), -limit, limit)
-    lag = 2.0 / (2.0 * np.pi * plant.sensors.f_lag) * rate + 0.5
+    lag = current_lag(plant) + 0.5
     smooth = np.apply_along_axis(np.convolve, -1, i_q, np.ones(21) / 21.0, "same")
     sector = (theta_e / (2.0 * np.pi)) % 1.0 * SECTORS
     sign = smooth / (np.abs(smooth) + I_SIGN)

@@ -17,10 +17,11 @@ from numba import njit
 from scipy.optimize import minimize
 
 from ema.effects.backlash import deflection
+from ema.faults import backlash
 from ema.models.actuator import Actuator
 
 from .cycles import Measured
-from .features import GROUPS, Array, acceleration, local_mean, motor_torque, spacing
+from .features import GROUPS, Array, acceleration, current_lag, delayed, local_mean, motor_torque, spacing
 
 FREQUENCIES = np.geomspace(100.0, 2000.0, 32)  # [rad/s]
 DAMPINGS = (0.01, 0.03, 0.1, 0.3)
@@ -28,32 +29,37 @@ WIDER = (1.0, 4.0)  # times the nominal backlash
 CLEAR = 0.7  # share of the squared gap's change from which a resonance is worth simulating
 INERTIAS = (0.1, 2.5)  # [kg m²]
 N_CYCLES = 4
+N_SUBSTEPS = 5  # of a sample, else the resonance comes out a hundredth too low
 MOVING = 10.0  # [rad/s] slower, dry friction takes up what it likes
 SCALE = 0.05  # what weak magnets or shorts make of the torque's scale, a priori
 REST = 0.1  # [N m] what is left of a cycle's torque balance, root of the sum of squares
 
 
 class Resonance(NamedTuple):
-    """Start values of the effect `gear_compliance`: rad/(N m), kg m², damping ratio."""
+    """Start values of the effect `gear_compliance`: rad/(N m), kg m², damping ratio; and of the fault k2 beside it."""
 
     compliance: float
     inertia: float
     damping: float
+    k2: float
 
 
 @njit(nogil=True)
-def _user(shaft: Array, start: float, w_0: float, zeta: float, b: float, T: float) -> Array:
-    """θ_u of a user behind a spring, driven by θ_m/GR. [rad]"""
-    theta, w = start, 0.0
+def _user(shaft: Array, start: tuple[float, float], w_0: float, zeta: float, b: float, T: float) -> Array:
+    """θ_u of a user behind a spring, driven by θ_m/GR; `start`: its θ_u and ω_u. [rad]"""
+    theta, w = start
     out = np.empty(len(shaft))
-    out[0] = start
+    out[0] = theta
+    dt = T / N_SUBSTEPS
     for t in range(1, len(shaft)):
-        twist = deflection(theta, shaft[t], b)
-        push = w_0 * w_0 * twist
-        if twist != 0.0:
-            push += 2.0 * zeta * w_0 * ((shaft[t] - shaft[t - 1]) / T - w)
-        w += T * push
-        theta += T * w
+        w_shaft = (shaft[t] - shaft[t - 1]) / T
+        for n in range(N_SUBSTEPS):
+            twist = deflection(theta, shaft[t - 1] + (n + 0.5) * dt * w_shaft, b)
+            push = w_0 * w_0 * twist
+            if twist != 0.0:
+                push += 2.0 * zeta * w_0 * (w_shaft - w)
+            w += dt * push
+            theta += dt * w
         out[t] = theta
     return out
 
@@ -62,14 +68,15 @@ def resonance(plant: Actuator, data: Measured) -> Resonance | None:
     """The likeliest resonance of the gear train, None where a stiff one explains the user as well."""
     T, GR = 1.0 / plant.control.rate, plant.transmission.GR
     signals = data.signals[:N_CYCLES]
+    starts = list(zip(data.start[:, 0].tolist(), data.user_speed.tolist(), strict=True))[:N_CYCLES]
     shafts = [np.ascontiguousarray(s.theta_m[0] / GR) for s in signals]
 
     def misfit(w_0: float, zeta: float, b: float) -> float:
         if not 0.5 * FREQUENCIES[0] < w_0 < 2.0 * FREQUENCIES[-1] or zeta > 1.0:
             return np.inf
         total = 0.0
-        for shaft, s in zip(shafts, signals, strict=True):
-            away = s.theta_u[0] - _user(shaft, float(s.theta_u[0, 0]), w_0, zeta, b, T)
+        for shaft, start, s in zip(shafts, starts, signals, strict=True):
+            away = s.theta_u[0] - _user(shaft, start, w_0, zeta, b, T)
             total += float(np.mean((away - away.mean()) ** 2))
         return total
 
@@ -80,9 +87,12 @@ def resonance(plant: Actuator, data: Measured) -> Resonance | None:
     if found.fun > CLEAR * stiff:
         return None
     w_0, zeta, b = np.exp(found.x)
-    inertia = _inertia(plant, data, [_user(x, float(s.theta_u[0, 0]), w_0, zeta, b, T)
-                                     for x, s in zip(shafts, signals, strict=True)])  # fmt: skip
-    return Resonance(float(1.0 / (w_0**2 * inertia)), inertia, float(np.clip(zeta, 0.005, 0.5)))
+    users = [_user(shaft, start, w_0, zeta, b, T) for shaft, start in zip(shafts, starts, strict=True)]
+    inertia = _inertia(plant, data, users)
+    k2 = (b / plant.transmission.b - 1.0) / (backlash(1.0, 1.0) - 1.0)
+    return Resonance(
+        float(1.0 / (w_0**2 * inertia)), inertia, float(np.clip(zeta, 0.005, 0.5)), float(np.clip(k2, 0.0, 1.0))
+    )
 
 
 def _inertia(plant: Actuator, data: Measured, users: list[Array]) -> float:
@@ -91,13 +101,14 @@ def _inertia(plant: Actuator, data: Measured, users: list[Array]) -> float:
     A, y = [], []
     for s, user in zip(data.signals, users, strict=False):
         m = spacing(GROUPS["torque"][0], plant.control.rate, len(user))
-        w_m = np.gradient(s.theta_m[0], T)
+        theta_m, user = (delayed(x, current_lag(plant)) for x in (s.theta_m[0], user))
+        w_m = np.gradient(theta_m, T)
         tau = local_mean(motor_torque(plant, s)[0][0], m)
         signs, speed = local_mean(np.tanh(w_m / 2.0), m), local_mean(w_m, m)
         a_u = acceleration(user, m, T)
         moving = np.abs(speed) > MOVING
         A.append(np.stack([a_u / plant.transmission.GR, signs, speed, tau, np.ones_like(tau)])[:, moving])
-        y.append((tau - plant.motor.J_m * acceleration(s.theta_m[0], m, T) - plant.motor.C * speed)[moving])
+        y.append((tau - plant.motor.J_m * acceleration(theta_m, m, T) - plant.motor.C * speed)[moving])
     A.append(np.array([[0.0, 0.0, 0.0, REST / SCALE, 0.0]]).T)
     y.append(np.zeros(1))
     coefficients, *_ = np.linalg.lstsq(np.concatenate(A, axis=1).T, np.concatenate(y), rcond=1e-9)

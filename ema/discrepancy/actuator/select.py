@@ -246,8 +246,9 @@ class Search:
         screened = self.screen(model, found)
         if model.excess > FAR:
             screened = self._simulated(model, screened)
-        for s in screened:  # one cause for several faults: tried in any case, since the faults hide what it promises
-            if s.candidate.effect not in refined and self._stands_for_faults(model, s.candidate):
+        alone = model.excess > FAR and screened[0].promised < NEARLY_ALL * cost
+        for s in screened:  # one cause for several faults is tried in any case, since the faults hide what it promises
+            if not alone and s.candidate.effect not in refined and self._stands_for_faults(model, s.candidate):
                 refined[s.candidate.effect] = self._refined(model, s)
         others: dict[str, Model] = {}
         for s in screened:
@@ -262,9 +263,8 @@ class Search:
         for s in self._looking_like(model, best, [s for s in screened if s.candidate.effect not in refined]):
             if s.candidate.effect not in refined:
                 refined[s.candidate.effect] = self._refined(model, s)
-        for name, m in self._close(
-            refined, model
-        ):  # a rival is out only if it leaves more when fitted as well as the best
+        # A rival is out only if it leaves more when fitted as well as the best.
+        for name, m in self._close(refined, model):
             again = self.model(m.effects, m.fit.free, m.fit.point, None, 4)
             refined[name] = min(m, again, key=lambda x: x.heldout)
         return sorted(refined.values(), key=lambda m: m.heldout)
