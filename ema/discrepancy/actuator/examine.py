@@ -39,6 +39,7 @@ ALIKE = 0.6  # share by which two models may leave more or less and be alike: la
 NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
 CLOSE = 0.5  # share of what was left, from which another turn is not worth it
 SAME = 0.05  # difference in held-out misfit up to which fewer causes are preferred
+UNLIKELY = 0.1  # odds of an effect, against what is no credible cause too, below which it is not named
 NEARLY = 0.5  # excess of a model that may be the right one but for switching
 NEAR, N_OWN = 1.0, 3  # excess up to which so many models are weighed by noise of their own
 DOUBTFUL = 2.0  # deviations from nothing, below which an effect is not named
@@ -124,6 +125,10 @@ def examine(
         after, v = _settled(search, after, v)
     after, v = _without_doubtful(search, after, v, alike)
     after, v = _with_zero(search, after, v, alike)
+    unlikely = [name for name in after.names if _confidence(search, after, name) < UNLIKELY]
+    if unlikely:
+        after, v, alike = before, path.verdict_before, []
+        conditions.append(f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named")
     alike = [_still_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
     findings = _findings(search, before, after, v, alike)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
