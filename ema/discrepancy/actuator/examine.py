@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -22,7 +22,7 @@ from .extension import as_extension
 from .fit import Fit
 from .noise import N_RUNS_SURE, Noise, Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
-from .select import CHANCE, FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, Model, Search, start_model
+from .select import CHANCE, FAR, FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, Model, Search, start_model
 from .structure import structure
 from .timing import samples_late
 
@@ -215,11 +215,9 @@ def _grown(
         enough = bool(after.effects) and after.excess < ENOUGH * before.excess + SLACK
         models = search.extend(after)
         needed = max(STRONG * after.excess, CHANCE) if enough else WORTH_IT * after.excess
-        real = [
-            m for m in models if after.excess - m.excess >= needed and _is_credible(m) and _does_it(search, m, after)
-        ]
-        if not real:
-            real = _with_own_noise(search, [m for m in models if m.heldout < after.heldout + SAME], after)
+        real = _real(search, models, after, needed)
+        if not real and not enough and after.excess < FAR:
+            real = _real(search, search.extend(after, models), after, needed)
         if not real:
             break
         after, *rivals = [m for m in real if _is_alike(m, real[0])]
@@ -237,6 +235,14 @@ def _grown(
             after, v = _settled(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
+
+
+def _real(search: Search, models: Sequence[Model], after: Model, needed: float) -> list[Model]:
+    """Of models with one more effect than `after`, those in which it is real: credible, and the gain is its own."""
+    gaining = [m for m in models if after.excess - m.excess >= needed]
+    return [m for m in gaining if _is_credible(m) and _does_it(search, m, after)] or _with_own_noise(
+        search, [m for m in models if m.heldout < after.heldout + SAME], after
+    )
 
 
 def _is_alike(model: Model, best: Model) -> bool:

@@ -235,16 +235,19 @@ class Search:
         start = {name: x for name, x in rival.fit.point.items() if name.startswith(f"{c.effect}.")}
         return self.model((*effects, c), (*frees, *c.frees), {**point, **start}, None, 4)
 
-    def extend(self, model: Model) -> list[Model]:
-        """The best models with one more effect, best first."""
+    def extend(self, model: Model, known: Sequence[Model] = ()) -> list[Model]:
+        """The best models with one more effect, best first.
+
+        With `known`, those that first order has led to, candidates that are not among them are simulated instead.
+        """
         line = "torque_line" if "cogging" in model.names else "cogging"
         found = candidates(self.plant.plant, self.plant.data, self.torques(model), line)
-        found = [c for c in found if c.effect not in model.names]
+        found = [c for c in found if c.effect not in {*model.names, *(m.names[-1] for m in known)}]
         refined: dict[str, Model] = {}
         cost = sum(float(r @ r) for r in model.fit.residuals.values())
         worth = max(WORTH_A_FIT * (cost - cost / model.fit.misfit), AT_LEAST * cost)
         screened = self.screen(model, found)
-        if model.excess > FAR:
+        if known or model.excess > FAR:
             screened = self._simulated(model, screened)
         alone = model.excess > FAR and screened[0].promised < NEARLY_ALL * cost
         for s in screened:  # one cause for several faults is tried in any case, since the faults hide what it promises
