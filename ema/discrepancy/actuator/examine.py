@@ -20,6 +20,7 @@ from .conditions import as_recorded
 from .cycles import Measured
 from .extension import as_extension
 from .fit import Fit
+from .gear import swinging
 from .noise import N_RUNS_SURE, Noise, Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
 from .select import CHANCE, FAR, FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, Model, Search, start_model
@@ -109,6 +110,7 @@ def examine(
         )
     train, heldout = split(data)
     plant, conditions = as_recorded(plant, data.signals)
+    data = swinging(plant, data)
     ema = EmaPlant(plant, data, n_threads)
     say("switching noise")
     search = Search(ema, Noise(ema, {}), train, heldout, say)

@@ -10,11 +10,12 @@ in which only K/J_u and ζ matter for θ_u; the torque balance of the motor, whi
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.optimize import minimize
+from scipy.optimize import least_squares, minimize
 
 from ema.effects.backlash import deflection
 from ema.faults import backlash
@@ -29,6 +30,8 @@ WIDER = (1.0, 4.0)  # times the nominal backlash
 CLEAR = 0.7  # share of the squared gap's change from which a resonance is worth simulating
 INERTIAS = (0.1, 2.5)  # [kg m²]
 N_CYCLES = 4
+N_TURNS = 2
+FIRST_SWING = 8.0  # [rad] of the resonance
 N_SUBSTEPS = 5  # of a sample, else the resonance comes out a hundredth too low
 MOVING = 10.0  # [rad/s] slower, dry friction takes up what it likes
 SCALE = 0.05  # what weak magnets or shorts make of the torque's scale, a priori
@@ -36,18 +39,22 @@ REST = 0.1  # [N m] what is left of a cycle's torque balance, root of the sum of
 
 
 class Resonance(NamedTuple):
-    """Start values of the effect `gear_compliance`: rad/(N m), kg m², damping ratio; and of the fault k2 beside it."""
+    """Start values of the effect `gear_compliance`: rad/(N m), kg m², damping ratio; and what comes with them.
+
+    `k2` is the fault beside it, `starts` are θ_u and ω_u at the start of each cycle, shape (n_cycles, 2). [rad, rad/s]
+    """
 
     compliance: float
     inertia: float
     damping: float
     k2: float
+    starts: Array
 
 
 @njit(nogil=True)
-def _user(shaft: Array, start: tuple[float, float], w_0: float, zeta: float, b: float, T: float) -> Array:
+def _user(shaft: Array, start: Array, w_0: float, zeta: float, b: float, T: float) -> Array:
     """θ_u of a user behind a spring, driven by θ_m/GR; `start`: its θ_u and ω_u. [rad]"""
-    theta, w = start
+    theta, w = start[0], start[1]
     out = np.empty(len(shaft))
     out[0] = theta
     dt = T / N_SUBSTEPS
@@ -64,35 +71,51 @@ def _user(shaft: Array, start: tuple[float, float], w_0: float, zeta: float, b: 
     return out
 
 
+def swinging(plant: Actuator, data: Measured) -> Measured:
+    """The cycles with the user starting as a gear that gives lets it, which no parabola tells; as they are if stiff."""
+    found = resonance(plant, data)
+    if found is None:
+        return data
+    start = np.stack([found.starts[:, 0], data.start[:, 1]], axis=1)
+    return replace(data, start=start, user_speed=found.starts[:, 1])
+
+
 def resonance(plant: Actuator, data: Measured) -> Resonance | None:
     """The likeliest resonance of the gear train, None where a stiff one explains the user as well."""
-    T, GR = 1.0 / plant.control.rate, plant.transmission.GR
-    signals = data.signals[:N_CYCLES]
-    starts = list(zip(data.start[:, 0].tolist(), data.user_speed.tolist(), strict=True))[:N_CYCLES]
-    shafts = [np.ascontiguousarray(s.theta_m[0] / GR) for s in signals]
+    T = 1.0 / plant.control.rate
+    users = [s.theta_u[0] for s in data.signals]
+    shafts = [np.ascontiguousarray(s.theta_m[0] / plant.transmission.GR) for s in data.signals]
+    starts = np.stack([data.start[:, 0], data.user_speed], axis=1)
 
     def misfit(w_0: float, zeta: float, b: float) -> float:
         if not 0.5 * FREQUENCIES[0] < w_0 < 2.0 * FREQUENCIES[-1] or zeta > 1.0:
             return np.inf
-        total = 0.0
-        for shaft, start, s in zip(shafts, starts, signals, strict=True):
-            away = s.theta_u[0] - _user(shaft, start, w_0, zeta, b, T)
-            total += float(np.mean((away - away.mean()) ** 2))
-        return total
+        cycles = zip(shafts[:N_CYCLES], users, starts, strict=False)
+        return sum(float(np.var(user - _user(shaft, start, w_0, zeta, b, T))) for shaft, user, start in cycles)
 
-    stiff = sum(float(np.var(s.theta_u[0] - shaft)) for shaft, s in zip(shafts, signals, strict=True))
+    stiff = sum(float(np.var(user - shaft)) for shaft, user in zip(shafts[:N_CYCLES], users, strict=False))
     grid = [(w, z, plant.transmission.b * x) for w in FREQUENCIES for z in DAMPINGS for x in WIDER]
     best = min(grid, key=lambda x: misfit(*x))
-    found = minimize(lambda x: misfit(*np.exp(x)), np.log(best), method="Nelder-Mead", options={"maxiter": 80})
-    if found.fun > CLEAR * stiff:
-        return None
-    w_0, zeta, b = np.exp(found.x)
-    users = [_user(shaft, start, w_0, zeta, b, T) for shaft, start in zip(shafts, starts, strict=True)]
-    inertia = _inertia(plant, data, users)
+    for _ in range(N_TURNS):  # the gear by the starts, the starts by the gear
+        found = minimize(lambda x: misfit(*np.exp(x)), np.log(best), method="Nelder-Mead", options={"maxiter": 80})
+        if found.fun > CLEAR * stiff:
+            return None
+        best = tuple(np.exp(found.x).tolist())
+        starts = np.array([_started(*of, *best, T) for of in zip(shafts, users, starts, strict=True)])
+    w_0, zeta, b = best
+    inertia = _inertia(plant, data, [_user(s, start, *best, T) for s, start in zip(shafts, starts, strict=True)])
     k2 = (b / plant.transmission.b - 1.0) / (backlash(1.0, 1.0) - 1.0)
-    return Resonance(
-        float(1.0 / (w_0**2 * inertia)), inertia, float(np.clip(zeta, 0.005, 0.5)), float(np.clip(k2, 0.0, 1.0))
+    damping = float(np.clip(zeta, 0.005, 0.5))
+    return Resonance(1.0 / (w_0**2 * inertia), inertia, damping, float(np.clip(k2, 0.0, 1.0)), starts)
+
+
+def _started(shaft: Array, user: Array, start: Array, w_0: float, zeta: float, b: float, T: float) -> Array:
+    """θ_u and ω_u with which the first swing comes out as recorded."""
+    n = round(FIRST_SWING / w_0 / T)
+    solved = least_squares(
+        lambda x: _user(shaft[:n], x, w_0, zeta, b, T) - user[:n], start, x_scale=(1.0, w_0), xtol=1e-10
     )
+    return np.asarray(solved.x)
 
 
 def _inertia(plant: Actuator, data: Measured, users: list[Array]) -> float:
