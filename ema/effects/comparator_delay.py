@@ -12,7 +12,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("time", "s", 0.0, 0.0, 5e-06, 1e-06, "from the comparator's decision to the leg's switching"),
     ),
-    sentence="the legs of the inverter switch {time:.2g} s after their comparators should",
+    sentence="the legs of the inverter switch {time:.2g} s later than their comparators decide",
     separated_by="gate signals, or currents sampled without anti-alias filter",
     mistaken_for=(),
     plants=("ema",),
