@@ -50,6 +50,10 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
         raise ConfigError(f"{plant_file}: key 'kind' = {kind!r}: must be one of {', '.join(EXAMINERS)}")
     examiner = import_module(EXAMINERS[kind])
     read = _chosen([read_record(path) for path in records], cycles)
+    findings_file, report, extended = (out / name for name in ("findings.json", "report.html", "extended.yaml"))
+    for path in (findings_file, report, extended):
+        if path.exists():
+            raise ConfigError(f"{path}: exists, and is not overwritten; choose another --out")
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -62,18 +66,18 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
             status.update(text)
 
         findings, draw = examiner.discrepancy(plant_file, read, say)
-        findings.write(out / "findings.json")
+        findings.write(findings_file)
         found = [*findings.effects, *findings.unnamed]
-        write_extended(plant_file, found, out / "extended.yaml", findings.fitted)
+        write_extended(plant_file, found, extended, findings.fitted)
         say("pictures")
         name = str(config.read_yaml(plant_file).get("name", plant_file.stem))
-        write_report(out / "report.html", name, [str(path) for path in records], findings, draw())
+        write_report(report, name, [str(path) for path in records], findings, draw())
     if as_json:
-        click.echo((out / "findings.json").read_text(encoding="utf-8"), nl=False)
+        click.echo(findings_file.read_text(encoding="utf-8"), nl=False)
     else:
         for sentence in findings.sentences():
             click.echo(sentence)
-        click.echo(f"{out / 'report.html'}")
+        click.echo(f"{report}")
 
 
 def _chosen(records: list[Record], numbers: str | None) -> list[Record]:

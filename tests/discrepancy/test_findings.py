@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
+from click.testing import CliRunner
+from ema_postflight.discrepancy import discrepancy
+
+from ema.core import resources
+from ema.core.errors import ConfigError
 from ema.discrepancy.findings import Findings, Gain
 
 GAIN = Gain(0.1, 0.1, 0.1, 0.1, 0.1)
@@ -21,3 +27,15 @@ def test_a_rest_beside_a_cause_is_told_where_it_can_be_seen():
     (rest,) = Findings("explained", [], GAIN, rest=2.0).sentences()
     assert "2 times the noise" in rest
     assert Findings("explained", [], GAIN, rest=2.0).as_dict()["rest"] == 2.0
+
+
+def test_what_was_found_before_is_not_overwritten(tmp_path):
+    """Least of all a plant file that an earlier run has extended, and that is examined further."""
+    plant, record, found = resources.config("actuator.yaml"), tmp_path / "flight.csv", tmp_path / "found"
+    record.write_text("t [s],i_a [A]\n0,0\n1e-4,0\n")
+    found.mkdir()
+    (found / "extended.yaml").write_bytes(plant.read_bytes())
+    words = ["--plant", str(found / "extended.yaml"), str(record), "--out", str(found)]
+    with pytest.raises(ConfigError, match=r"extended\.yaml: exists, and is not overwritten"):
+        CliRunner().invoke(discrepancy, words, catch_exceptions=False)
+    assert (found / "extended.yaml").read_bytes() == plant.read_bytes()
