@@ -201,7 +201,7 @@ def resolver_zero(plant: Actuator, zero: float) -> Candidate:
 
 def _commutation(plant: Actuator, zero: float) -> Candidate:
     c = _plain("commutation_offset", "angle", "apart")
-    return Commutation(c.effect, c.frees, c.fixed, c.linear, c.steps, _electrical(plant, zero))
+    return Commutation(**vars(c), recorded=_electrical(plant, zero))
 
 
 def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line: str = "cogging") -> list[Candidate]:
@@ -248,7 +248,7 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line:
     if gear is not None:
         step = {"compliance": gear.compliance}
         c = _plain("gear_compliance", "compliance", step=step, inertia=gear.inertia, damping=gear.damping)
-        found.append(Seen(c.effect, c.frees, c.fixed, c.linear, c.steps, {"k2": gear.k2}))
+        found.append(Seen(**vars(c), faults_seen={"k2": gear.k2}))
     for order, _ in lines(torques):
         frees = (
             free(f"{line}.amplitude", 0.002),

@@ -115,9 +115,7 @@ def examine(
     say("switching noise")
     search = Search(ema, Noise(ema, {}), train, heldout, say)
     path = _shortest(search, _faults_only(search))
-    search.noise, search.tried = path.noise, path.tried
-    take_step(ema, path.step)
-    ema.late = path.late
+    _resume(search, path)
     before, alike = path.before, path.alike
     after, v = settled, _ = _settled(search, path.after, path.verdict)
     if not path.verdict_before.is_noise:
@@ -185,11 +183,16 @@ def _shortest(search: Search, paths: list[Path]) -> Path:
     return best
 
 
+def _resume(search: Search, path: Path) -> None:
+    """Noise, tried models and conditions of the bench as they are on a path."""
+    search.noise, search.tried = path.noise, list(path.tried)
+    take_step(search.plant, path.step)
+    search.plant.late = path.late
+
+
 def _gone(search: Search, begun: Path) -> Path:
     """A path to its end: what explains the cycles."""
-    search.noise, search.tried = begun.noise, list(begun.tried)
-    take_step(search.plant, begun.step)
-    search.plant.late = begun.late
+    _resume(search, begun)
     before, verdict_before = _surely(search, begun.before, begun.verdict)
     if not verdict_before.is_noise:
         before, verdict_before = _as_on_the_bench(search, before, verdict_before, PLAIN)

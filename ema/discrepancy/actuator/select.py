@@ -249,9 +249,11 @@ class Search:
         screened = self.screen(model, found)
         if known or model.excess > FAR:
             screened = self._simulated(model, screened)
+        # One cause for several faults is tried whatever it promises, since the faults hide that: unless another,
+        # simulated far from the data, takes nearly all by itself.
         alone = model.excess > FAR and screened[0].promised < NEARLY_ALL * cost
-        for s in screened:  # one cause for several faults is tried in any case, since the faults hide what it promises
-            if not alone and s.candidate.effect not in refined and self._stands_for_faults(model, s.candidate):
+        for s in () if alone else screened:
+            if s.candidate.effect not in refined and self._stands_for_faults(model, s.candidate):
                 refined[s.candidate.effect] = self._refined(model, s)
         others: dict[str, Model] = {}
         for s in screened:
