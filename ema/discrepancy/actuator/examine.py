@@ -125,7 +125,8 @@ def examine(
         after, v = _settled(search, after, v)
     after, v = _without_doubtful(search, after, v, alike)
     after, v = _with_zero(search, after, v, alike)
-    unlikely = [name for name in after.names if _confidence(search, after, name) < UNLIKELY]
+    sets = [(name, *rivals) for name, rivals in zip(after.names, alike, strict=True)]
+    unlikely = [names[0] for names in sets if sum(_confidence(search, after, *names)) < UNLIKELY]
     if unlikely:
         after, v, alike = before, path.verdict_before, []
         conditions.append(f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named")
@@ -535,11 +536,15 @@ def _found(
             parameters[p.name] = Quantity(
                 values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
             )
-    return FoundEffect(e.name, _confidence(search, model, effect), alike, parameters, e.said(values), e.separated_by)
+    confidence, *_ = _confidence(search, model, effect)
+    return FoundEffect(e.name, confidence, alike, parameters, e.said(values), e.separated_by)
 
 
-def _confidence(search: Search, model: Model, effect: str) -> float:
-    """Odds of this effect against what else was tried in its place, by held-out misfit; a library is never complete."""
+def _confidence(search: Search, model: Model, effect: str, *rivals: str) -> list[float]:
+    """Odds of an effect of `model`, and of its rivals, against all that was tried in its place, by held-out misfit.
+
+    A library is never complete.
+    """
     place = model.names.index(effect)
     n = sum(len(search.plant.data.y[c]) for c in search.heldout)
     best: dict[str, float] = {}
@@ -549,7 +554,7 @@ def _confidence(search: Search, model: Model, effect: str) -> float:
     own = best.get(effect, model.heldout)
     least = min(own, *best.values())
     odds = {name: np.exp(-0.5 * n * (x - least) / max(least, 1.0)) for name, x in {**best, effect: own}.items()}
-    return float(0.99 * odds[effect] / sum(odds.values()))
+    return [float(0.99 * odds.get(name, 0.0) / sum(odds.values())) for name in (effect, *rivals)]
 
 
 def settled(plant: EmaPlant) -> int:
