@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -134,10 +135,37 @@ CASES: dict[str, Case] = {
 }  # fmt: skip
 
 
+# Singly not seen in every record: beside another effect their absence from an answer would say nothing.
+SELDOM_SEEN = ("clock_skew", "adc_saturation", "saturation", "winding_resistance")
+COMMON = [name for name, c in CASES.items() if len(c.effects) == 1 and name not in SELDOM_SEEN]
+
+
+def together(n: int, seed: int) -> str:
+    """Name of a case of `n` effects of the library at once."""
+    return " + ".join(Random(10 * seed + n).sample(COMMON, n))
+
+
+def case(name: str) -> Case:
+    """A case of the table, or several of them at once."""
+    if name in CASES:
+        return CASES[name]
+    parts = [CASES[part] for part in name.split(" + ")]
+    return Case(
+        _both(*(part.draw for part in parts)),
+        tuple(effect for part in parts for effect in part.effects),
+        parameters={p: truth for part in parts for p, truth in part.parameters.items()},
+    )
+
+
+def kind(name: str) -> str:
+    """The row of a table that a case belongs to."""
+    return name if name in CASES else f"{len(name.split(' + '))} effects"
+
+
 def draw(name: str, seed: int) -> tuple[dict[str, float], list[float]]:
     """Values of the flaws and the fault vector of one trial."""
     rng = np.random.default_rng([seed, *name.encode()])
-    values = CASES[name].draw(rng)
+    values = case(name).draw(rng)
     k = rng.uniform(0.0, 0.06, 6) * (rng.random(6) < 0.4)
     if name == "none":
         k[:] = 0.0
@@ -178,16 +206,16 @@ def visibility(hidden: Any, flaws: Any, n: int, seed: int, motions: Any, bench: 
 
 def outcome(name: str, findings: dict[str, Any]) -> str:
     """How the finder did: right, in set, wrong, missed."""
-    case = CASES[name]
+    of = case(name)
     sets = [{e["name"], *e["indistinguishable_from"]} for e in findings["effects"]]
     named = [e["name"] for e in findings["effects"]]
     verdict = findings["verdict"]
-    if case.outside:
+    if of.outside:
         return "missed" if verdict == "adequate" else "right" if verdict == "unexplained" and not named else "wrong"
-    if not case.effects:
+    if not of.effects:
         return "right" if verdict == "adequate" else "wrong"
-    if sorted(named) == sorted(case.effects) and all(len(s) == 1 for s in sets):
+    if sorted(named) == sorted(of.effects) and all(len(s) == 1 for s in sets):
         return "right"
-    if named and all(s & set(case.effects) for s in sets):
-        return "in set" if all(any(t in s for s in sets) for t in case.effects) else "missed"
+    if named and all(s & set(of.effects) for s in sets):
+        return "in set" if all(any(t in s for s in sets) for t in of.effects) else "missed"
     return "wrong" if named else "missed"
