@@ -14,7 +14,7 @@ from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
 from ema.effects import registry
 from ema.models.actuator import Actuator
 
-from .candidates import resolver_zero
+from .candidates import Candidate, resolver_zero
 from .comparators import CLEAR, PLAIN, find_step, take_step
 from .conditions import as_recorded
 from .cycles import Measured
@@ -23,7 +23,7 @@ from .fit import Fit
 from .gear import swinging
 from .noise import N_RUNS_SURE, Noise, Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
-from .select import CHANCE, FAR, FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, Model, Search, start_model
+from .select import CHANCE, FAR, FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, NEARLY_ALL, Model, Search, start_model
 from .structure import structure
 from .timing import samples_late
 
@@ -119,6 +119,7 @@ def examine(
     before, alike = path.before, path.alike
     after, v = settled, _ = _settled(search, path.after, path.verdict)
     if not path.verdict_before.is_noise:
+        after, v = _with_fewer_faults(search, after, v, alike)
         after, v = _simpler(search, after, v, alike)
     after, v = _without_superfluous(search, after, v, alike)
     if after is not settled:
@@ -228,9 +229,9 @@ def _grown(
             break
         after, *rivals = [m for m in real if _is_alike(m, real[0])]
         if after.excess < NEW_NOISE * left:  # what runs differ by depends on the point, and so does every weight
+            near = [m for m in real if m in (after, *rivals) or m.excess < max(NEARLY, NEARLY_ALL * left)]
             left = max(after.excess, CHANCE)
             search.noise = Noise(search.plant, after.fit.point)
-            near = [m for m in real if m in (after, *rivals) or m.excess < NEARLY]
             near = [search.model(m.effects, m.fit.free, m.fit.point, m.fit.columns, 2) for m in near]
             after, *rivals = sorted(near, key=lambda m: m.heldout)
         alike.append(tuple(m.names[-1] for m in rivals if _is_alike(m, after)))
@@ -306,6 +307,28 @@ def _as_on_the_bench(search: Search, model: Model, v: Verdict, share: float = CL
     return model, v
 
 
+def _with_fewer_faults(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+    """`model`, or where it leaves little, one without faults whose common part an effect of it can be just as well."""
+    if not v.is_noise and model.excess > NEARLY:
+        return model, v
+    for place, effect in enumerate(model.effects):
+        m = search.without_common_faults(model, effect)
+        if m is None or search.left_more(m, model, (search.noise,)) > SAME:
+            continue
+        w = search.verdict(m)
+        if w.is_noise or not v.is_noise:
+            alike[place] = (*alike[place], _in_common(m, effect))
+            model, v = m, w
+            search.say(f"{effect.effect} without {alike[place][-1]}: p = {v.p_value:.2g}")
+    return model, v
+
+
+def _in_common(model: Model, effect: Candidate) -> str:
+    """What an effect of `model` stands for: faults that the model does without, or what its faults have in common."""
+    gone = [name for name in FAULTS if name not in {f.name for f in model.fit.free}]
+    return f"{' and '.join(gone)} alike" if len(gone) > 1 else f"what {' and '.join(effect.faults)} have in common"
+
+
 def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
     """`model`, or where it leaves little, one with an effect for several faults that leaves no more.
 
@@ -330,12 +353,9 @@ def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ..
     if not as_good:
         return model, v
     least, m, w, search.noise = min(as_good, key=lambda found: found[0])
-    gone = [name for name in FAULTS if name not in {f.name for f in m.fit.free}]
     rivals = [n.names[-1] for more, n, *_ in as_good if n is not m and more - least < ALIKE * m.excess + CHANCE]
-    in_common = f"what {' and '.join(m.effects[-1].faults)} have in common"
-    same = f"{' and '.join(gone)} alike" if len(gone) > 1 else in_common
-    alike.append((same, *rivals))
-    search.say(f"{m.names[-1]} instead of {', '.join(gone)}: p = {w.p_value:.2g}")
+    alike.append((_in_common(m, m.effects[-1]), *rivals))
+    search.say(f"{m.names[-1]} instead of {alike[-1][0]}: p = {w.p_value:.2g}")
     return m, w
 
 

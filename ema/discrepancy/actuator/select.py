@@ -282,10 +282,8 @@ class Search:
         k = model.fit.point
         found = []
         for c in candidates(self.plant.plant, self.plant.data, []):
-            faults = c.faults
-            common = min((k.get(name, 0.0) for name in faults), default=0.0)
-            gone = [name for name in faults if k.get(name, 0.0) - common < K_SEEN]
-            if c.effect in model.names or common < K_SEEN or len(faults) < 2 or len(gone) < len(c.linear):
+            common, gone = _common(model, c)
+            if c.effect in model.names or not gone or len(gone) < len(c.linear):
                 continue
             (c,) = self.probe([c])
             while made := self._in_place_of(model, c, gone, common):
@@ -296,6 +294,15 @@ class Search:
                 if made.heldout < model.heldout + CHANCE or len(gone) <= len(c.linear):
                     break
         return sorted(found, key=lambda m: m.heldout)
+
+    def without_common_faults(self, model: Model, c: Candidate) -> Model | None:
+        """`model` without what the faults that one of its effects can be mistaken for have in common, if they do."""
+        common, gone = _common(model, c)
+        if not gone:
+            return None
+        rest = {name: model.fit.point[name] - common for name in c.faults} | dict.fromkeys(gone, 0.0)
+        frees = tuple(f for f in model.fit.free if f.name not in gone)
+        return self.model(model.effects, frees, {**model.fit.point, **rest}, model.fit.columns, 7)
 
     def _in_place_of(self, model: Model, c: Candidate, gone: Sequence[str], common: float) -> Model | None:
         """`model` with an effect for what several faults have in common, and without those of them that are gone."""
@@ -407,6 +414,15 @@ class Search:
                 n += len(r[at])
                 total += len(r[at]) * float(np.log1p(np.mean(r[at] ** 2)))
         return n * float(np.expm1(total / n))
+
+
+def _common(model: Model, c: Candidate) -> tuple[float, list[str]]:
+    """What the several faults that an effect can be mistaken for have in common, and which of them are no larger."""
+    faults = {name: model.fit.point.get(name, 0.0) for name in c.faults}
+    common = min(faults.values(), default=0.0)
+    if len(faults) < 2 or common < K_SEEN:
+        return 0.0, []
+    return common, [name for name, x in faults.items() if x - common < K_SEEN]
 
 
 def _stripped(model: Model, effect: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:
