@@ -119,6 +119,32 @@ def test_what_another_bench_does_with_the_currents_is_named_and_the_fault_stays(
 
 
 @pytest.mark.slow
+def test_unequal_sensors_beside_a_resolver_error_are_no_shorts_and_no_magnet(hidden, shipped_plant):
+    """Sensors that all read too low look like shorts of all phases: the simpler cause is named, the other told."""
+    gains = {"gain_a": -0.018, "gain_b": 0.005, "gain_c": -0.004}
+    record = hide(hidden, once_cosine=0.014, twice_sine=-0.005, **gains, k6=0.03)
+    findings = examine(shipped_plant, measured(shipped_plant, [record])).findings
+    assert findings.verdict == "explained"
+    found = {e.name: e for e in findings.effects}
+    assert set(found) == {"resolver_error", "current_gain"}
+    for name, gain in gains.items():
+        assert found["current_gain"].parameters[name].value == pytest.approx(gain, abs=0.002)
+        assert found["current_gain"].parameters[name].low < gain < found["current_gain"].parameters[name].high
+    assert findings.gain.k_after == pytest.approx((0.0, 0.0, 0.0, 0.0, 0.0, 0.03), abs=0.005)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("flaw", [{"load": 1.8}, {"asymmetry": -0.2}], ids=["load", "friction"])
+def test_a_load_and_friction_that_knows_directions_come_as_a_set(hidden, shipped_plant, flaw):
+    """They differ at breakaway only: neither is told with confidence."""
+    findings = examine(shipped_plant, measured(shipped_plant, [hide(hidden, k2=0.04, **flaw)])).findings
+    assert findings.verdict == "explained"
+    (found,) = findings.effects
+    assert {found.name, *found.indistinguishable_from} == {"constant_load", "asymmetric_friction"}
+    assert found.separated_by
+
+
+@pytest.mark.slow
 def test_a_gear_that_gives_is_measured_though_its_user_swings_when_cycles_begin(hidden, shipped_plant):
     """Without the user's exact start the truth itself had left a misfit of 800, and the fit ended 16 % off."""
     cycles = hidden.cycles(hidden.Flaws(compliance=2.4e-5, user_damping=30.0, k2=0.02, k3=0.03), 4, 5)
