@@ -41,8 +41,9 @@ MIMICKED = 0.02  # of an effect's mark in power, where less is left of it beside
 
 @dataclass
 class _State:
-    """Model so far, and for each accepted effect the trials in its place and the model without it."""
+    """Models without effects and so far, and for each accepted effect the trials in its place and the model without."""
 
+    plain: Tried
     model: Tried
     rounds: list[tuple[dict[str, Tried], Tried]]
     tried: list[dict[str, Any]]
@@ -54,12 +55,13 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
     everything = list(range(len(plant.blocks)))
     progress("nominal model")
     plain = base_model(plant)
-    verdict = _judged(plant, plain)
-    state = _State(plain, [], [])
+    state = _State(plain, plain, [], [])
     notes: list[str] = []
-    if not verdict.is_noise:
+    if not _judged(plant, plain).is_noise:
         _select(plant, state, progress)
         _revise(plant, state, progress)
+    plain = state.plain
+    verdict = _judged(plant, plain)
     progress("final fit")
     chosen = list(state.model.accepted)  # where folds suggested different parameters, those of the first fold
     free = [*plant.base, *(f for c in chosen for f in c.free)]
@@ -128,21 +130,33 @@ def _judged(plant: Plant, model: Tried) -> Verdict:
 
 
 def _select(plant: Plant, state: _State, progress: Progress) -> None:
-    """Forward selection until the residual is noise, nothing helps, or enough kinds are in the model."""
-    plain = state.model
+    """Forward selection until the residual is noise, nothing helps, or enough kinds are in the model.
+
+    Dry friction has side minima: where the model does as well without an effect, begun where the fit with it ended, the
+    gain was not the effect's own.
+    """
+    begun_anew_with = -1  # effects
     while not _judged(plant, state.model).is_noise:
         trials = _round(plant, state, state.model, progress)
         best = choice(trials, state.model) if trials else None
         if best is None or not is_worth_it(trials[best], state.model):
             return
         candidate = trials[best].accepted[-1]
-        if candidate.is_structure and _is_explained(plant, plain, state.model):
+        if candidate.is_structure and _is_explained(plant, state.plain, state.model):
             return  # what the wrong form of a law leaves needs no cause of its own
         kinds = {c.effect for c in state.model.accepted if c.is_structure == candidate.is_structure}
         if candidate.effect not in kinds and len(kinds) >= (MAX_TERMS if candidate.is_structure else MAX_EFFECTS):
             return
         if len(state.model.accepted) >= MAX_ADDED:
             return
+        n = len(state.model.accepted)
+        again = _leave_out(plant, trials[best], {n})
+        if compare(again, state.model).gain > 0.0 and not is_worth_it(trials[best], again):
+            if n == begun_anew_with:
+                return
+            begun_anew_with = n
+            state.model, state.plain = again, again if n == 0 else state.plain
+            continue
         state.rounds.append((trials, state.model))
         state.model = trials[best]
 

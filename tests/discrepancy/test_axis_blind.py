@@ -27,6 +27,16 @@ def test_nothing_hidden_is_adequate(axis_bench, hidden_axis, seed):
     assert outcome.effects == []
 
 
+def test_friction_in_a_side_minimum_is_fitted_again_and_nothing_is_named(axis_bench, hidden_axis):
+    """One window in which the axis nearly comes to rest had been a spring of 1e-6 N m/rad, or eighteen others."""
+    bench, plant_file, motions = hidden_axis.drawn(280)
+    bench, _, rng = hidden_axis.bench_with([], 280, bench)
+    record = axis_bench.record(bench, rng, motions=motions)
+    outcome = examine(AxisPlant(RotaryAxis.model_validate(plant_file), [record]))
+    assert outcome.verdict == "adequate"
+    assert outcome.effects == []
+
+
 def test_more_friction_is_fitted_and_not_called_an_effect(axis_bench, hidden_axis):
     bench, _, rng = hidden_axis.bench_with([], 11)
     bench.F_d, bench.F_s = 1.6 * bench.F_d, 1.6 * bench.F_s
