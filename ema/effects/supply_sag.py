@@ -8,6 +8,15 @@ from .base import Effect, Parameter
 
 
 @njit(inline="always")
+def link_voltage(u_dc, V_dc, i_dc, resistance, capacitance, dt):
+    """Voltage of the DC link one implicit step on; without a capacitor it follows the current at once.   [V]
+
+    C du/dt = (V - u) / R_s - i
+    """
+    return u_dc + dt / (resistance * capacitance + dt) * (V_dc - resistance * i_dc - u_dc)
+
+
+@njit(inline="always")
 def applied(u, i, resistance, U):
     """Voltage at the motor where `u` is commanded for a supply of `U` that is loaded with (u/U) i.   [V]
 
@@ -24,7 +33,10 @@ def commanded(u, i, resistance, U):
 
 EFFECT = Effect(
     name="supply_sag",
-    parameters=(Parameter("resistance", "ohm", 0.0, 0.0, 3.0, 0.2, "resistance of source and wiring"),),
+    parameters=(
+        Parameter("resistance", "ohm", 0.0, 0.0, 3.0, 0.2, "resistance of source and wiring"),
+        Parameter("capacitance", "F", 0.0, 0.0, 0.02, 5e-3, "capacitor of the DC link (three-phase actuator)"),
+    ),
     sentence="the supply sags by {resistance:.2g} V per ampere",
     separated_by="record of the bus voltage; a motion fast enough to reach the voltage limit",
     plants=("ema", "axis"),

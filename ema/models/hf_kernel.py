@@ -13,6 +13,7 @@ from numba import njit
 from ema.effects.backlash import deflection, follow
 from ema.effects.dry_friction import speed_after
 from ema.effects.inverter import comparator, leg_voltage, share_of_step
+from ema.effects.supply_sag import link_voltage
 from ema.effects.trapezoid import sector, six_step, trap
 from ema.effects.vector_math import TWO_PI, cos, sin
 
@@ -36,7 +37,8 @@ E_ELECTRIC, E_COPPER, E_SHAFT, E_FRICTION, E_USER = map(
     row, ("E_electric", "E_copper", "E_shaft", "E_friction", "E_user")
 )
 COMPLIANCE, INERTIA, DAMPING = (row(f"gear_compliance.{x}") for x in ("compliance", "inertia", "damping"))
-SOURCE_R, DEAD_TIME, DELAY = map(row, ("supply_sag.resistance", "dead_time.time", "comparator_delay.time"))
+SOURCE_R, SOURCE_C = row("supply_sag.resistance"), row("supply_sag.capacitance")
+DEAD_TIME, DELAY = row("dead_time.time"), row("comparator_delay.time")
 COMMUTATION, APART = map(row, ("commutation_offset.angle", "commutation_offset.apart"))
 GAIN_A, GAIN_B, GAIN_C = (row(f"current_gain.gain_{j}") for j in "abc")
 OFFSET_A, OFFSET_B, OFFSET_C = (row(f"current_offset.offset_{j}") for j in "abc")
@@ -45,7 +47,6 @@ OFFSET_A, OFFSET_B, OFFSET_C = (row(f"current_offset.offset_{j}") for j in "abc"
 OUTPUTS = ("i_a", "i_b", "i_c", "theta_m", "theta_u", "w_m", "u_dc", "I_ref")
 THIRD = TWO_PI / 3.0
 COS_THIRD, SIN_THIRD = -0.5, 0.75**0.5
-TAU_DC_LINK = 1e-3  # [s] capacitor of the DC link: it hides the switching from the source
 
 _jit = njit(fastmath=jit.FAST, error_model="numpy", forceinline=True)
 
@@ -113,7 +114,7 @@ def electrical_step(z, l, N, dt, parts, audited):
         z[OFF_B * N + l] = max(off_b - dt, 0.0)
         z[OFF_C * N + l] = max(off_c - dt, 0.0)
         i_dc = 0.5 * (s_a * i_a + s_b * i_b + s_c * i_c)
-        z[U_DC * N + l] = u_dc + dt / TAU_DC_LINK * (z[V_DC * N + l] - z[SOURCE_R * N + l] * i_dc - u_dc)
+        z[U_DC * N + l] = link_voltage(u_dc, z[V_DC * N + l], i_dc, z[SOURCE_R * N + l], z[SOURCE_C * N + l], dt)
     else:
         u_dc = z[V_DC * N + l]
         v_a, v_b, v_c = 0.5 * u_dc * s_a, 0.5 * u_dc * s_b, 0.5 * u_dc * s_c

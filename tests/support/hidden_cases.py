@@ -178,7 +178,8 @@ def draw_bench(hidden: Any, name: str, seed: int) -> tuple[Any, Any]:
     """Motions and bench of one trial; `hidden` is the module hidden_actuator."""
     rng = np.random.default_rng([seed, 1, *name.encode()])
     motions, bench = hidden.drawn_motions(rng), hidden.drawn_bench(rng)
-    return motions, bench._replace(position=0.0) if name in ("position_friction", "cushion") else bench
+    local = {"position_friction", "cushion"} & set(name.split(" + "))  # must be passed
+    return motions, bench._replace(position=0.0) if local else bench
 
 
 def visibility(hidden: Any, flaws: Any, n: int, seed: int, motions: Any, bench: Any) -> float:

@@ -234,7 +234,7 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line:
         _plain("winding_resistance", "change"),
     ]
     if all(s.u_dc is not None for s in data.signals):
-        found.append(_plain("supply_sag", "resistance"))
+        found.append(_plain("supply_sag", "resistance", capacitance=5e-3))
     if np.ptp(data.dT) > WARMER:
         found.append(_plain("magnet_flux", "per_kelvin"))
         found.append(_plain("winding_resistance", "per_kelvin"))

@@ -225,6 +225,8 @@ def _grown(
         real = _real(search, models, after, needed)
         if not real and not enough and after.excess < FAR:
             real = _real(search, search.extend(after, models), after, needed)
+        if not real and enough:
+            real = _leaving_noise(search, models, after)
         if not real:
             break
         after, *rivals = [m for m in real if _is_alike(m, real[0])]
@@ -250,6 +252,15 @@ def _real(search: Search, models: Sequence[Model], after: Model, needed: float) 
     return [m for m in gaining if _is_credible(m) and _does_it(search, m, after)] or _with_own_noise(
         search, [m for m in models if m.heldout < after.heldout + SAME], after
     )
+
+
+def _leaving_noise(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
+    """Models that leave noise where `after` leaves hardly more, as no law of another form makes it.
+
+    The misfit of noise itself is not one but for the noise that it was estimated from.
+    """
+    gaining = [m for m in models if after.heldout - m.heldout > 2.0 * CHANCE]
+    return [m for m in gaining if _is_credible(m) and _does_it(search, m, after) and search.verdict(m).is_noise]
 
 
 def _is_alike(model: Model, best: Model) -> bool:
