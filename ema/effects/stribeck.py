@@ -6,9 +6,10 @@ from .base import Effect, Parameter
 from .vector_math import exp_negative
 
 
-def factor(theta_m, w_m, theta_u, direction, tau_load, excess, speed):
-    """F_d × [1 + e exp(-|ω_m| / ω_s)]"""
-    return 1.0 + excess * exp_negative(-abs(w_m) / speed)
+def factor(theta_m, w_m, theta_u, direction, tau_load, excess, speed, shape):
+    """F_d × [1 + e exp(-x (1 + s (x - 1)))], x = |ω_m| / ω_s: Tustin's exponential (s = 0) to a Gaussian (s = 1)."""
+    x = abs(w_m) / speed
+    return 1.0 + excess * exp_negative(min(-x * (1.0 + shape * (x - 1.0)), 0.0))
 
 
 EFFECT = Effect(
@@ -18,6 +19,7 @@ EFFECT = Effect(
             "excess", "1", 0.0, 0.0, 1.5, 0.3, "sliding friction at zero speed over its value at high speed, less one"
         ),
         Parameter("speed", "rad/s", 10.0, 0.5, 80.0, 10.0, "speed over which the excess fades by 1/e"),
+        Parameter("shape", "1", 0.0, 0.0, 1.2, 0.5, "how it fades: 0 exponentially, 1 as a Gaussian"),
     ),
     sentence="Stribeck friction: sliding friction {excess:.0%} higher at low speed, fading over {speed:.3g} rad/s",
     separated_by="slow motion at several constant speeds",

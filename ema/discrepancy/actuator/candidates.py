@@ -229,7 +229,7 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line:
         _plain("saturation", "emf", "inductance"),
         _plain("speed_delay", "time"),
         _plain("spring_load", "stiffness"),
-        *(_plain("stribeck", "excess", speed=speed) for speed in (4.0, 15.0, 40.0)),
+        *(_plain("stribeck", "excess", speed=speed, shape=0.5) for speed in (4.0, 15.0, 40.0)),
         _plain("viscous_drag", "coefficient"),
         _plain("winding_resistance", "change"),
     ]

@@ -223,7 +223,7 @@ def _grown(
         models = search.extend(after)
         needed = max(STRONG * after.excess, CHANCE) if enough else WORTH_IT * after.excess
         real = _real(search, models, after, needed)
-        if not real and not enough and after.excess < FAR:
+        if not real and after.excess < FAR:
             real = _real(search, search.extend(after, models), after, needed)
         if not real and enough:
             real = _leaving_noise(search, models, after)

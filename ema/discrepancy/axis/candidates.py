@@ -144,7 +144,11 @@ def _quadratic(plant: AxisPlant, s: Sizes) -> _Spec:
 
 def _stribeck(plant: AxisPlant, s: Sizes) -> _Spec:
     w = s.speed
-    return {"excess": (0.0, 3.0, (0.3,), 0.1), "speed": (0.01 * w, w, (0.03 * w, 0.1 * w, 0.3 * w), 0.05 * w)}
+    return {
+        "excess": (0.0, 3.0, (0.3,), 0.1),
+        "speed": (0.01 * w, w, (0.03 * w, 0.1 * w, 0.3 * w), 0.05 * w),
+        "shape": (0.0, 1.2, (0.0, 1.0), 0.2),
+    }
 
 
 def _spring(plant: AxisPlant, s: Sizes) -> _Spec | None:
