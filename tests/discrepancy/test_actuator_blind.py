@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
@@ -115,6 +116,25 @@ def test_what_another_bench_does_with_the_currents_is_named_and_the_fault_stays(
     assert found.value == pytest.approx(value, rel=0.1)
     assert found.low < value < found.high
     assert findings.gain.k_after == pytest.approx((0.03, 0.0, 0.0, 0.0, 0.0, 0.0), abs=3e-3)
+    assert findings.gain.heldout_after < 1.2 * findings.gain.noise_floor
+
+
+@pytest.mark.slow
+def test_a_magnet_that_weakens_as_the_winding_warms_is_told_per_kelvin(hidden, shipped_plant):
+    """The first cycle is the coldest and shows nothing of it; the warmest are held out."""
+    warming, motion = (21.0, 33.0, 45.0, 57.0, 66.0), (hidden.chirp(),)
+    cycles = []
+    for number, temperature in enumerate(warming):
+        flaws = hidden.Flaws(flux=-0.0018 * (temperature - 20.0), k1=0.03)
+        channels = hidden.cycles(flaws, 1, 30 + number, motion)[0]
+        cycles.append(Cycle(number, {**channels, "temp_w": np.full(len(channels["t"]), temperature)}))
+    findings = examine(shipped_plant, measured(shipped_plant, [Record(tuple(cycles))])).findings
+    assert findings.verdict == "explained"
+    assert [e.name for e in findings.effects] == ["magnet_flux"]
+    per_kelvin = findings.effects[0].parameters["per_kelvin"]
+    assert per_kelvin.value == pytest.approx(-0.0018, rel=0.05)
+    assert per_kelvin.low < -0.0018 < per_kelvin.high
+    assert findings.gain.k_after == pytest.approx((0.03, 0.0, 0.0, 0.0, 0.0, 0.0), abs=5e-3)
     assert findings.gain.heldout_after < 1.2 * findings.gain.noise_floor
 
 

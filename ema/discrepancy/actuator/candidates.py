@@ -61,6 +61,10 @@ class Candidate:
         of = f"{self.effect} {' '.join(self.linear)}"
         return of + "".join(f" {name}={value:.4g}" for name, value in sorted(self.fixed.items()))
 
+    def probe_name(self, j: int) -> str:
+        """Name of the column of a probe, which ends with that of the parameter."""
+        return f"{self.key}/{j}.{self.linear[j % len(self.linear)]}"
+
     @property
     def amounts(self) -> Array:
         """By how much each probe differs from neutral."""
@@ -236,8 +240,8 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line:
     if all(s.u_dc is not None for s in data.signals):
         found.append(_plain("supply_sag", "resistance", capacitance=5e-3))
     if np.ptp(data.dT) > WARMER:
-        found.append(_plain("magnet_flux", "per_kelvin"))
-        found.append(_plain("winding_resistance", "per_kelvin"))
+        for effect in ("magnet_flux", "winding_resistance"):
+            found += [_plain(effect, "per_kelvin"), _plain(effect, "change", "per_kelvin")]
     top = max(float(np.abs(s.i).max()) for s in data.signals)
     if any(int((np.abs(s.i) > top - FLAT).sum()) >= FLAT_SAMPLES for s in data.signals):
         limit = free("adc_saturation.limit", CLIPPED_STEP)

@@ -128,13 +128,23 @@ def excess_at(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]
 
 
 def stacked_jacobian(noise: Noise, frees: Sequence[Free], cols: Columns, cycles: Sequence[int]) -> Array:
-    """Whitened Jacobian of all cycles below each other, (n_cycles * n_features, n_free)."""
-    data = noise.plant.data
+    """Whitened Jacobian of all cycles below each other, (n_cycles * n_features, n_free).
+
+    Columns are those of each motion's reference cycle; what acts per kelvin does so in proportion.
+    """
+    data, first = noise.plant.data, noise.plant.first
     by_motion = {
         m: noise.motions[m].white(np.array([cols[m, f.name] for f in frees])).T
         for m in sorted({int(data.motion[c]) for c in cycles})
     }
-    return np.concatenate([by_motion[int(data.motion[c])] for c in cycles])
+    per_kelvin = np.array([f.name.endswith(".per_kelvin") for f in frees])
+
+    def at(cycle: int) -> Array:
+        motion = int(data.motion[cycle])
+        dT, dT_column = data.dT[cycle], data.dT[first[motion]]
+        return by_motion[motion] * np.where(per_kelvin, dT / dT_column if dT_column else 0.0, 1.0)
+
+    return np.concatenate([at(c) for c in cycles])
 
 
 def bounded(J: Array, r: Array, low: Array, high: Array) -> tuple[Array, float]:

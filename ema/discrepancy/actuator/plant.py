@@ -54,7 +54,9 @@ class EmaPlant:
         self.noise_steps: tuple[float, ...] = NOISE_STEPS
         self.late = 0  # samples by which the recorded command is late against the other channels
         self.n_motions = len(data.commands)
-        self.first = [int(np.flatnonzero(data.motion == m)[0]) for m in range(self.n_motions)]
+        of_motion = [np.flatnonzero(data.motion == m) for m in range(self.n_motions)]
+        # Cycles with which columns are simulated: the first of each motion, or where temperature differs the farthest.
+        self.first = [int(cycles[np.argmax(np.abs(data.dT[cycles]))]) for cycles in of_motion]
         groups = [features(plant, data.signals[c]) for c in self.first]
         self.slices = [slices(g) for g in groups]
         self.floors = [floors(g) for g in groups]

@@ -176,7 +176,7 @@ class Search:
                 halves = []
                 for motion, cycle in enumerate(first):
                     column = (runs[cycle].features - here[cycle].features) / amount
-                    self.columns[motion, f"{c.key}/{j}"] = column.mean(axis=0)
+                    self.columns[motion, c.probe_name(j)] = column.mean(axis=0)
                     white = self.noise.motions[motion].white(column)
                     halves.append([white[half::2].mean(axis=0) for half in (0, 1)])
                 a, b = np.concatenate(halves, axis=1)
@@ -200,6 +200,7 @@ class Search:
             )
             start = {**moved(f.point, f.free, step[: len(f.free)]), **c.start(step[len(f.free) :])}
             ranked.append(Screened(promised, c, start))
+        ranked = [s for s in ranked if not any(_does_as_well(t, s, AT_LEAST * float(r @ r)) for t in ranked)]
         return sorted(ranked, key=lambda entry: entry.promised)
 
     def owed_to(self, model: Model, effect: Candidate, *, in_training: bool = False) -> float:
@@ -210,7 +211,7 @@ class Search:
         return self.noise.misfit(list(left.values()), cycles) - (model.fit.misfit if in_training else model.heldout)
 
     def _columns(self, c: Candidate) -> Array:
-        names = [Free(f"{c.key}/{j}", 0.0, 0.0, 1.0) for j in range(len(c.amounts))]
+        names = [Free(c.probe_name(j), 0.0, 0.0, 1.0) for j in range(len(c.amounts))]
         return stacked_jacobian(self.noise, names, self.columns, self.train)
 
     def start_with(self, model: Model, c: Candidate, faults: Point) -> Point:
@@ -439,6 +440,12 @@ class Screened(NamedTuple):
     promised: float
     candidate: Candidate
     start: Point
+
+
+def _does_as_well(simpler: Screened, s: Screened, hardly: float) -> bool:
+    """Whether the same effect with fewer parameters promises hardly less."""
+    fewer = len(simpler.candidate.linear) < len(s.candidate.linear)
+    return simpler.candidate.effect == s.candidate.effect and fewer and simpler.promised < s.promised + hardly
 
 
 def start_model(search: Search) -> Model:
