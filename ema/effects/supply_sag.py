@@ -38,6 +38,7 @@ EFFECT = Effect(
         Parameter("capacitance", "F", 0.0, 0.0, 0.02, 5e-3, "capacitor of the DC link (three-phase actuator)"),
     ),
     sentence="the supply sags by {resistance:.2g} V per ampere",
+    besides={"capacitance": ", behind a capacitor of {capacitance:.2g} F"},
     separated_by="record of the bus voltage; a motion fast enough to reach the voltage limit",
     plants=("ema", "axis"),
 )

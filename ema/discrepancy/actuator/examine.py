@@ -364,8 +364,8 @@ def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ..
     if not as_good:
         return model, v
     least, m, w, search.noise = min(as_good, key=lambda found: found[0])
-    rivals = [n.names[-1] for more, n, *_ in as_good if n is not m and more - least < ALIKE * m.excess + CHANCE]
-    alike.append((_in_common(m, m.effects[-1]), *rivals))
+    rivals = dict.fromkeys(n.names[-1] for more, n, *_ in as_good if more - least < ALIKE * m.excess + CHANCE)
+    alike.append((_in_common(m, m.effects[-1]), *(name for name in rivals if name != m.names[-1])))
     search.say(f"{m.names[-1]} instead of {alike[-1][0]}: p = {w.p_value:.2g}")
     return m, w
 
@@ -574,7 +574,7 @@ def _found(
 def _confidence(search: Search, model: Model, effect: str, *rivals: str) -> list[float]:
     """Odds of an effect of `model`, and of its rivals, against all that was tried in its place, by held-out misfit.
 
-    A library is never complete.
+    Differences that seeds make do not count; a library is never complete.
     """
     place = model.names.index(effect)
     n = sum(len(search.plant.data.y[c]) for c in search.heldout)
@@ -584,7 +584,8 @@ def _confidence(search: Search, model: Model, effect: str, *rivals: str) -> list
             best[m.names[place]] = min(m.heldout, best.get(m.names[place], np.inf))
     own = best.get(effect, model.heldout)
     least = min(own, *best.values())
-    odds = {name: np.exp(-0.5 * n * (x - least) / max(least, 1.0)) for name, x in {**best, effect: own}.items()}
+    more = {name: max(x - least - CHANCE, 0.0) for name, x in {**best, effect: own}.items()}
+    odds = {name: np.exp(-0.5 * n * x / max(least, 1.0)) for name, x in more.items()}
     return [float(0.99 * odds.get(name, 0.0) / sum(odds.values())) for name in (effect, *rivals)]
 
 
