@@ -219,7 +219,7 @@ def _grown(
     """`after` with as many further effects as are real."""
     left = after.excess
     while not v.is_noise and len(set(after.names) - {"torque_line"}) < MAX_EFFECTS:  # a second line is no further cause
-        enough = bool(after.effects) and after.excess < ENOUGH * before.excess + SLACK
+        enough = _is_enough(after, before)
         models = search.extend(after)
         needed = max(STRONG * after.excess, CHANCE) if enough else WORTH_IT * after.excess
         real = _real(search, models, after, needed)
@@ -244,6 +244,11 @@ def _grown(
             after, v = _settled(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
+
+
+def _is_enough(model: Model, before: Model) -> bool:
+    """Whether effects explain all but what the form of their laws may leave, which is never far from the data."""
+    return bool(model.effects) and model.excess < min(ENOUGH * before.excess + SLACK, DISTANT)
 
 
 def _real(search: Search, models: Sequence[Model], after: Model, needed: float) -> list[Model]:
@@ -473,7 +478,7 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
     torque_lines = [c for c in after.effects if c.effect in ("cogging", "torque_line")]
     odd = [c for c in torque_lines if not _integer(after.fit, c.effect)]
     further = [c for c in torque_lines if c.effect == "torque_line" and not odd]
-    explained = v.is_noise or (bool(after.effects) and after.excess < ENOUGH * before.excess + SLACK)
+    explained = v.is_noise or _is_enough(after, before)
     verdict: Literal["adequate", "explained", "unexplained"] = (
         "adequate" if not after.effects and v.is_noise else "explained" if explained and not odd else "unexplained"
     )
