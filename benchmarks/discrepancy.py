@@ -132,7 +132,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 def _wanted(seeds: range, n_none: int, only: Sequence[str]) -> Iterator[tuple[str, int]]:
     """Cases and seeds: each case, two and three effects at once; more seeds of no flaw, since alarms are rare."""
     for seed in seeds:
-        for name in only or (*cases.CASES, cases.together(2, seed), cases.together(3, seed)):
+        for name in only or (*cases.CASES, *cases.PAIRS, cases.together(2, seed), cases.together(3, seed)):
             yield name, seed
     if seeds and not only:
         for seed in range(seeds.stop, seeds.start + n_none):

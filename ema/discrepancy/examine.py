@@ -57,9 +57,8 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
     plain = base_model(plant)
     state = _State(plain, plain, [], [])
     notes: list[str] = []
-    if not _judged(plant, plain).is_noise:
-        _select(plant, state, progress)
-        _revise(plant, state, progress)
+    _select(plant, state, progress)
+    _revise(plant, state, progress)
     plain = state.plain
     verdict = _judged(plant, plain)
     progress("final fit")

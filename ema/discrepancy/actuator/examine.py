@@ -220,11 +220,12 @@ def _grown(
     left = after.excess
     while not v.is_noise and len(set(after.names) - {"torque_line"}) < MAX_EFFECTS:  # a second line is no further cause
         enough = _is_enough(after, before)
-        models = search.extend(after)
+        screened = search.promising(after)
+        models = search.extend(after, screened)
         needed = max(STRONG * after.excess, CHANCE) if enough else WORTH_IT * after.excess
         real = _real(search, models, after, needed)
         if not real and after.excess < FAR:
-            real = _real(search, search.extend(after, models), after, needed)
+            real = _real(search, search.extend(after, screened, models), after, needed)
         if not real and enough:
             real = _leaving_noise(search, models, after)
         if not real:
@@ -254,9 +255,14 @@ def _is_enough(model: Model, before: Model) -> bool:
 def _real(search: Search, models: Sequence[Model], after: Model, needed: float) -> list[Model]:
     """Of models with one more effect than `after`, those in which it is real: credible, and the gain is its own."""
     gaining = [m for m in models if after.excess - m.excess >= needed]
-    return [m for m in gaining if _is_credible(m) and _does_it(search, m, after)] or _with_own_noise(
+    return _by_themselves(search, gaining, after) or _with_own_noise(
         search, [m for m in models if m.heldout < after.heldout + SAME], after
     )
+
+
+def _by_themselves(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
+    """Models with a credible last effect to which they owe what they gain over `after`."""
+    return [m for m in models if _is_credible(m) and _does_it(search, m, after)]
 
 
 def _leaving_noise(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
@@ -265,7 +271,7 @@ def _leaving_noise(search: Search, models: Sequence[Model], after: Model) -> lis
     The misfit of noise itself is not one but for the noise that it was estimated from.
     """
     gaining = [m for m in models if after.heldout - m.heldout > 2.0 * CHANCE]
-    return [m for m in gaining if _is_credible(m) and _does_it(search, m, after) and search.verdict(m).is_noise]
+    return [m for m in _by_themselves(search, gaining, after) if search.verdict(m).is_noise]
 
 
 def _is_alike(model: Model, best: Model) -> bool:

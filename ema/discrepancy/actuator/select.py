@@ -236,18 +236,22 @@ class Search:
         start = {name: x for name, x in rival.fit.point.items() if name.startswith(f"{c.effect}.")}
         return self.model((*effects, c), (*frees, *c.frees), {**point, **start}, None, 4)
 
-    def extend(self, model: Model, known: Sequence[Model] = ()) -> list[Model]:
-        """The best models with one more effect, best first.
+    def promising(self, model: Model) -> list[Screened]:
+        """All that may stand beside the effects of `model`, by what it promises to first order."""
+        line = "torque_line" if "cogging" in model.names else "cogging"
+        found = candidates(self.plant.plant, self.plant.data, self.torques(model), line)
+        return self.screen(model, [c for c in found if c.effect not in model.names])
+
+    def extend(self, model: Model, screened: Sequence[Screened], known: Sequence[Model] = ()) -> list[Model]:
+        """The best models with one more effect of those screened, best first.
 
         With `known`, those that first order has led to, candidates that are not among them are simulated instead.
         """
-        line = "torque_line" if "cogging" in model.names else "cogging"
-        found = candidates(self.plant.plant, self.plant.data, self.torques(model), line)
-        found = [c for c in found if c.effect not in {*model.names, *(m.names[-1] for m in known)}]
+        tried = {m.names[-1] for m in known}
+        screened = [s for s in screened if s.candidate.effect not in tried]
         refined: dict[str, Model] = {}
         cost = sum(float(r @ r) for r in model.fit.residuals.values())
         worth = max(WORTH_A_FIT * (cost - cost / model.fit.misfit), AT_LEAST * cost)
-        screened = self.screen(model, found)
         if known or model.excess > FAR:
             screened = self._simulated(model, screened)
         # One cause for several faults is tried whatever it promises, since the faults hide that: unless another,
@@ -301,14 +305,12 @@ class Search:
         common, gone = _common(model, c)
         if not gone:
             return None
-        rest = {name: model.fit.point[name] - common for name in c.faults} | dict.fromkeys(gone, 0.0)
-        frees = tuple(f for f in model.fit.free if f.name not in gone)
+        rest, frees = _without_common(model, c, common, gone)
         return self.model(model.effects, frees, {**model.fit.point, **rest}, model.fit.columns, 7)
 
     def _in_place_of(self, model: Model, c: Candidate, gone: Sequence[str], common: float) -> Model | None:
         """`model` with an effect for what several faults have in common, and without those of them that are gone."""
-        rest = {name: 0.0 if name in gone else model.fit.point[name] - common for name in c.faults}
-        frees = tuple(f for f in model.fit.free if f.name not in gone)
+        rest, frees = _without_common(model, c, common, gone)
         made = self.model((*model.effects, c), (*frees, *c.frees), self.start_with(model, c, rest), None, 3)
         if made.heldout > HOPELESS:
             return None
@@ -424,6 +426,12 @@ def _common(model: Model, c: Candidate) -> tuple[float, list[str]]:
     if len(faults) < 2 or common < K_SEEN:
         return 0.0, []
     return common, [name for name, x in faults.items() if x - common < K_SEEN]
+
+
+def _without_common(model: Model, c: Candidate, common: float, gone: Sequence[str]) -> tuple[Point, tuple[Free, ...]]:
+    """Faults of an effect less what they have in common, zero where they are gone, and what else stays free."""
+    rest = {name: 0.0 if name in gone else model.fit.point[name] - common for name in c.faults}
+    return rest, tuple(f for f in model.fit.free if f.name not in gone)
 
 
 def _stripped(model: Model, effect: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:
