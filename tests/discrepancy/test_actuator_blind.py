@@ -13,8 +13,13 @@ from ema_postflight.discrepancy import discrepancy
 from ema.core import config, resources
 from ema.core.csv_records import write_csv
 from ema.core.records import Cycle, Record
+from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.cycles import measured
-from ema.discrepancy.actuator.examine import examine
+from ema.discrepancy.actuator.examine import examine, split
+from ema.discrepancy.actuator.fit import K_FREE
+from ema.discrepancy.actuator.noise import Noise
+from ema.discrepancy.actuator.plant import EmaPlant
+from ema.discrepancy.actuator.select import Search
 from ema.models.actuator import Actuator
 
 
@@ -162,6 +167,23 @@ def test_a_load_and_friction_that_knows_directions_come_as_a_set(hidden, shipped
     (found,) = findings.effects
     assert {found.name, *found.indistinguishable_from} == {"constant_load", "asymmetric_friction"}
     assert found.separated_by
+
+
+@pytest.mark.slow
+def test_what_is_alike_only_beside_what_is_found_is_a_rival(hidden, shipped_plant):
+    """By probes without faults and inertia a constant load seemed unlike friction that knows directions."""
+    rng = np.random.default_rng([1, 1, *b"asymmetric_friction + position_friction + inertia"])
+    motions, bench = hidden.drawn_motions(rng), hidden.drawn_bench(rng)
+    flaws = hidden.Flaws(asymmetry=0.136, inertia=0.205, k1=0.047, k4=0.027, k6=0.05)
+    cycles = hidden.cycles(flaws, 2 * len(motions), 1, motions, bench)
+    data = measured(shipped_plant, [Record(tuple(Cycle(number, c) for number, c in enumerate(cycles)))])
+    start = {"k1": 0.047, "k4": 0.027, "k6": 0.05, "inertia.change": 0.2}
+    plant = EmaPlant(shipped_plant, data)
+    search = Search(plant, Noise(plant, start), *split(data))
+    inertia = next(c for c in candidates(shipped_plant, data, []) if c.effect == "inertia")
+    found = search.model((inertia,), (*K_FREE, *inertia.frees), start, None, 1)
+    near = {m.names[-1] for m in search.extend(found, search.promising(found)) if m.heldout < 2.0}
+    assert {"constant_load", "asymmetric_friction"} <= near
 
 
 @pytest.mark.slow

@@ -51,6 +51,7 @@ ONE_CAUSE = 0.25  # relative spread up to which several parameters are one cause
 K_SEEN = 0.01  # a fault that is there
 CHANCE = 0.03  # difference in misfit that seeds make
 COLLINEAR = 0.8  # cosine from which two effects look like each other
+RESEMBLING = 0.3  # cosine by probes at the nominal point, from which they are compared where the fit is
 FAR = 100.0  # excess from which candidates are simulated before they are ranked
 NEARLY = 1.5  # misfit of a model that may be the right one, but for noise that is not its own
 NEARLY_ALL = 0.01  # share of what there was to explain, up to which a rival may still leave it for want of iterations
@@ -317,21 +318,43 @@ class Search:
         return self.model(made.effects, made.fit.free, made.fit.point, made.fit.columns, 7)
 
     def _looking_like(self, model: Model, best: Model, screened: Sequence[Screened]) -> list[Screened]:
-        """Those that can do, beside what is free in `model`, nearly all that the last effect of `best` does."""
+        """Those that can do, beside what else is free, nearly all that the last effect of `best` does.
+
+        What probes do where nothing else acts may mislead: what resembles the effect there is asked once more where
+        `best` is, and begins with what does the same there.
+        """
         effect = best.effects[-1]
         names = [f"{effect.effect}.{name}" for name in effect.linear]
         values = np.array([best.fit.point[name] - self.plant.neutral(name) for name in names])
-        own, _ = np.linalg.qr(stacked_jacobian(self.noise, model.fit.free, model.fit.columns, self.train))
         frees = [f for f in best.fit.free if f.name in names]
         done = stacked_jacobian(self.noise, frees, best.fit.columns, self.train) @ values
-        done -= own @ (own.T @ done)
+        others, rest = _stripped(best, effect)[1:]
+        own = stacked_jacobian(self.noise, model.fit.free, model.fit.columns, self.train)
+        own_there = stacked_jacobian(self.noise, others, best.fit.columns, self.train)
+        found = []
+        for s in screened:
+            c = s.candidate
+            share, _ = _doing(done, self._columns(c), own)
+            if share > COLLINEAR:
+                found.append(s)
+            elif share > RESEMBLING:
+                share, values = _doing(done, self._columns_at(best.fit.point, c), own_there)
+                if share > COLLINEAR:
+                    found.append(s._replace(start={**rest, **c.start(np.clip(values, *c.limits()))}))
+        return found
 
-        def reaches(s: Screened) -> bool:
-            reach = self._columns(s.candidate)
-            Q, _ = np.linalg.qr(reach - own @ (own.T @ reach))
-            return float(np.linalg.norm(Q.T @ done)) > COLLINEAR * float(np.linalg.norm(done))
-
-        return [s for s in screened if reaches(s)]
+    def _columns_at(self, point: Point, c: Candidate) -> Array:
+        """Whitened columns (per unit) of a candidate beside all that a point has."""
+        first = self.plant.first
+        points = [point, *({**point, **probe} for probe in c.probes())]
+        here, *there = self.plant.means(points, first, N_PROBE, SEED, (DT_PROBE,))
+        names = [Free(c.probe_name(j), 0.0, 0.0, 1.0) for j in range(len(c.amounts))]
+        cols = {
+            (motion, f.name): (at[cycle] - here[cycle]) / amount
+            for f, amount, at in zip(names, c.amounts, there, strict=True)
+            for motion, cycle in enumerate(first)
+        }
+        return stacked_jacobian(self.noise, names, cols, self.train)
 
     def _simulated(self, model: Model, screened: Sequence[Screened]) -> list[Screened]:
         """Candidates by what their starts leave when simulated: far from the data first order promises little."""
@@ -417,6 +440,14 @@ class Search:
                 n += len(r[at])
                 total += len(r[at]) * float(np.log1p(np.mean(r[at] ** 2)))
         return n * float(np.expm1(total / n))
+
+
+def _doing(done: Array, columns: Array, own: Array) -> tuple[float, Array]:
+    """What share of something columns can do beside others, and the values with which they do."""
+    Q, _ = np.linalg.qr(own)
+    done, columns = (x - Q @ (Q.T @ x) for x in (done, columns))
+    values = np.asarray(np.linalg.lstsq(columns, done, rcond=None)[0])
+    return float(np.linalg.norm(columns @ values)) / max(float(np.linalg.norm(done)), 1e-300), values
 
 
 def _common(model: Model, c: Candidate) -> tuple[float, list[str]]:
