@@ -21,6 +21,7 @@ SEED = 1_000_000
 K_STEP = 0.03  # below, the switching noise of a difference is as large as the difference
 TRUSTED = 0.75  # share of the promised gain, below which columns are taken anew
 LENGTH = 150.0  # of a step, in standard deviations of a cycle: four times the noise of one cycle's features
+FAR_OFF = 1.5  # misfit above which steps may be longer than first order says
 SHORT = 75.0  # of a step near the end, where the curvature of the response counts for more than noise
 
 
@@ -212,15 +213,9 @@ def fit(
         step, promised = bounded(J, r, *bounds(frees, point))
         if cost - promised < 4.0 * len(frees) and not stale:
             break
-        improved, gained, before, before_cost = False, 0.0, point, cost
-        for share in (1.0, 0.5, 0.2):
-            candidate = moved(point, frees, share * step)
-            new = residuals(plant, noise, candidate, cycles, n_seeds)
-            new_cost = sum(float(x @ x) for x in new.values())
-            if new_cost < cost:
-                gained, improved = cost - new_cost, True
-                point, res, cost = candidate, new, new_cost
-                break
+        before, before_cost = point, cost
+        point, res, cost = _along(plant, noise, frees, step, (point, res, cost), cycles, n_seeds)
+        improved, gained = cost < before_cost, before_cost - cost
         was_fresh = all(where == before for where in at.values())
         if not improved or gained < TRUSTED * (before_cost - promised):
             at.clear()  # old columns may be to blame
@@ -234,6 +229,44 @@ def fit(
     found = [res[c] for c in cycles]
     solution = np.split(_pseudo_inverse(J), np.cumsum([len(r) for r in found])[:-1], axis=1)
     return concluded(plant, noise, frees, point, cols, res, solution, 1.0 / n_seeds)
+
+
+Reached = tuple[Point, dict[int, Array], float]  # a point, its whitened residuals and their sum of squares
+
+
+def _along(
+    plant: EmaPlant,
+    noise: Noise,
+    frees: Sequence[Free],
+    step: Array,
+    here: Reached,
+    cycles: Sequence[int],
+    n_seeds: int,
+) -> Reached:
+    """The point along a step that leaves less than `here`, if there is one; further than the step while that gains.
+
+    Noise in columns that are nearly alike makes the step between them too short.
+    """
+    low, high = bounds(frees, here[0])
+
+    def reach(share: float) -> Reached:
+        point = moved(here[0], frees, np.clip(share * step, low, high))
+        res = residuals(plant, noise, point, cycles, n_seeds)
+        return point, res, sum(float(x @ x) for x in res.values())
+
+    for share in (1.0, 0.5, 0.2):
+        best = reach(share)
+        if best[2] < here[2]:
+            break
+    else:
+        return here
+    while share >= 1.0 and noise.misfit(list(best[1].values()), cycles) > FAR_OFF:
+        share *= 2.0
+        longer = reach(share)
+        if longer[2] >= best[2]:
+            break
+        best = longer
+    return best
 
 
 def with_short_steps(plant: EmaPlant, noise: Noise, found: Fit, cycles: Sequence[int]) -> Fit:

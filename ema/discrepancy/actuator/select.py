@@ -395,15 +395,13 @@ class Search:
             k = model.fit.point
             common = min(k[name] for name in faults)
             less = (dict.fromkeys(faults, 0.0), {name: k[name] - common for name in faults})
-            simpler, simpler_cost = self._better([self._alone(model, s.candidate, rest) for rest in less], model)
+            nearer, _ = self._better([self.start_with(model, s.candidate, rest) for rest in less], model)
+            # From there the effect alone goes as far as it can.
+            alone = fit(self.plant, self.noise, s.candidate.frees, nearer, self.train, n_iterations=3)
+            simpler, simpler_cost = self._better([alone.point], model)
             if simpler_cost < NO_WORSE * cost:
                 start = simpler
         return self.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3)
-
-    def _alone(self, model: Model, c: Candidate, faults: Point) -> Point:
-        """The start with some faults at other values, from where the effect alone has gone as far as it can."""
-        start = self.start_with(model, c, faults)
-        return fit(self.plant, self.noise, c.frees, start, self.train, n_iterations=3).point
 
     def _stands_for_faults(self, model: Model, c: Candidate) -> bool:
         """Whether all of the several faults that the effect can be mistaken for are seen in the model."""
