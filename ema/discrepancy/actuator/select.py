@@ -297,7 +297,7 @@ class Search:
                 if np.ptp(values) <= ONE_CAUSE * abs(values.mean()):
                     found.append(made)
                 gone.remove(max(gone, key=lambda name: k[name]))  # what is small may be there
-                if made.heldout < model.heldout + CHANCE or len(gone) <= len(c.linear):
+                if made.heldout < model.heldout + CHANCE or len(gone) < len(c.linear):
                     break
         return sorted(found, key=lambda m: m.heldout)
 
