@@ -66,7 +66,8 @@ class Examination:
 class Path:
     """One way through the search: with what noise, step of the comparators and command, from where to where.
 
-    `alike` holds, for each effect of `after`, what does as well in its place.
+    `alike` holds, for each effect of `after`, what does as well in its place, `as_well` the effects that would explain
+    as well what several of its faults have in common.
     """
 
     noise: Noise
@@ -78,13 +79,14 @@ class Path:
     after: Model
     verdict: Verdict
     alike: list[tuple[str, ...]]
+    as_well: list[str]
 
     @classmethod
     def of(cls, search: Search, model: Model) -> Path:
         """The beginning, where nothing is explained yet."""
         v = search.verdict(model)
         plant = search.plant
-        return cls(search.noise, plant.step, plant.late, list(search.tried), model, v, model, v, [])
+        return cls(search.noise, plant.step, plant.late, list(search.tried), model, v, model, v, [], [])
 
 
 def split(data: Measured) -> tuple[list[int], list[int]]:
@@ -120,7 +122,7 @@ def examine(
     after, v = settled, _ = _settled(search, path.after, path.verdict)
     if not path.verdict_before.is_noise:
         after, v = _with_fewer_faults(search, after, v, alike)
-        after, v = _simpler(search, after, v, alike)
+        after, v = _simpler(search, after, v, alike, path.as_well)
     after, v = _without_superfluous(search, after, v, alike)
     if after is not settled:
         after, v = _settled(search, after, v)
@@ -133,6 +135,8 @@ def examine(
         conditions.append(f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named")
     alike = [_still_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
     findings = _findings(search, before, after, v, alike)
+    if findings.verdict == "adequate":
+        conditions.extend(path.as_well)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
         findings, after = _with_function(search, findings, before, after)
     if ema.late:
@@ -173,10 +177,10 @@ def _faults_only(search: Search) -> list[Path]:
 
 
 def _shortest(search: Search, paths: list[Path]) -> Path:
-    """The first path that leaves noise, or else the one that leaves least by the noise of both."""
+    """The first path that leaves next to nothing, or else the one that leaves least by the noise of both."""
     best = _gone(search, paths[0])
     for path in paths[1:]:
-        if best.verdict.is_noise:
+        if best.verdict.is_noise or best.after.excess < CHANCE:
             break
         search.say("again, with the noise that faults alone make")
         other = _gone(search, path)
@@ -200,6 +204,7 @@ def _gone(search: Search, begun: Path) -> Path:
         before, verdict_before = _as_on_the_bench(search, before, verdict_before, PLAIN)
     search.say(f"faults only: p = {verdict_before.p_value:.2g}, most visible: {verdict_before.loudest}")
     alike: list[tuple[str, ...]] = []
+    as_well: list[str] = []
     after, v = _grown(search, before, before, verdict_before, alike)
     if not v.is_noise:  # the library had its chance
         other, w = _as_on_the_bench(search, after, v)
@@ -208,9 +213,9 @@ def _gone(search: Search, begun: Path) -> Path:
                 before, verdict_before = other, w
             after, v = _grown(search, before, other, w, alike)
     if verdict_before.is_noise:
-        after, v = _simpler(search, after, v, alike)
+        after, v = _simpler(search, after, v, alike, as_well)
     plant = search.plant
-    return Path(search.noise, plant.step, plant.late, search.tried, before, verdict_before, after, v, alike)
+    return Path(search.noise, plant.step, plant.late, search.tried, before, verdict_before, after, v, alike, as_well)
 
 
 def _grown(
@@ -224,7 +229,7 @@ def _grown(
         models = search.extend(after, screened)
         needed = max(STRONG * after.excess, CHANCE) if enough else WORTH_IT * after.excess
         real = _real(search, models, after, needed)
-        if not real and after.excess < FAR:
+        if not real and needed <= after.excess < FAR:
             real = _real(search, search.extend(after, screened, models), after, needed)
         if not real and enough:
             real = _leaving_noise(search, models, after)
@@ -285,7 +290,7 @@ def _with_own_noise(search: Search, models: list[Model], after: Model) -> list[M
     What runs differ by depends on the point. Where faults stand for an effect, the noise there hides what the true
     model gains; so either is weighed by its own, and must do better by that of both.
     """
-    if after.excess > NEAR:
+    if not 0.0 < after.excess <= NEAR:
         return []
     here, found = search.noise, []
     for m in models[:N_OWN]:
@@ -351,10 +356,23 @@ def _in_common(model: Model, effect: Candidate) -> str:
     return f"{' and '.join(gone)} alike" if len(gone) > 1 else f"what {' and '.join(effect.faults)} have in common"
 
 
-def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+def _instead(model: Model) -> str:
+    """What the last effect of a model would stand for, told beside the faults."""
+    effect = model.effects[-1]
+    e = registry()[effect.effect]
+    values = {p.name: model.fit.point.get(f"{e.name}.{p.name}", p.neutral) for p in e.parameters}
+    common = _in_common(model, effect)
+    return (
+        f"instead of {common}, {e.said(values)} would explain the record as well; to tell them apart: {e.separated_by}"
+    )
+
+
+def _simpler(
+    search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]], as_well: list[str]
+) -> tuple[Model, Verdict]:
     """`model`, or where it leaves little, one with an effect for several faults that leaves no more.
 
-    With no fewer parameters than `model` it must leave less.
+    With no fewer parameters than `model` it must leave less; what leaves as much is told in `as_well`.
     What runs differ by depends on the model too, so either is weighed by the noise of both.
     """
     if not v.is_noise and model.excess > NEARLY:
@@ -371,6 +389,8 @@ def _simpler(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ..
         fewer = len(m.fit.free) < len(model.fit.free)
         if more < (SAME if fewer else -CHANCE) and (w.is_noise or not v.is_noise):
             as_good.append((more, m, w, search.noise))
+        elif more < CHANCE and w.is_noise:
+            as_well.append(_instead(m))
     search.noise = here
     if not as_good:
         return model, v
