@@ -40,6 +40,18 @@ def test_neither_nothing_nor_a_fault_is_an_effect(hidden, shipped_plant, k):
 
 
 @pytest.mark.slow
+def test_three_unequal_shorts_are_told_with_the_magnet_that_would_do_as_well(hidden, shipped_plant):
+    """As many causes either way, and comparators on a finer grid hide what tells them apart: the answer names both."""
+    k = {"k3": 0.046, "k4": 0.073, "k5": 0.062}
+    cycles = hidden.cycles(hidden.Flaws(**k), 3, 1, (hidden.chirp(),), hidden.Bench(substeps=200))
+    record = Record(tuple(Cycle(number, channels) for number, channels in enumerate(cycles)))
+    findings = examine(shipped_plant, measured(shipped_plant, [record])).findings
+    assert findings.verdict == "adequate"
+    assert findings.gain.k_before[2:5] == pytest.approx(tuple(k.values()), abs=0.006)
+    assert any("what k3 and k4 and k5 have in common, magnet flux changed by" in note for note in findings.notes)
+
+
+@pytest.mark.slow
 def test_a_motion_that_was_recorded_once_is_held_out(hidden, shipped_plant):
     """Two motions, one cycle each: what one says of the faults holds on the other."""
     cycles = hidden.cycles(hidden.Flaws(k1=0.04), 2, 3, motions=(hidden.chirp(), hidden.chirp(0.02, 3.0)))
