@@ -407,29 +407,36 @@ def _without_superfluous(
     """`model` without the effects that others have made superfluous, or that have only led the fit there."""
     for effect in model.effects:
         if len(model.effects) > 1 and search.owed_to(model, effect) < CHANCE:
-            reduced = search.without(model, effect)
-            if reduced.heldout < model.heldout + SAME:
-                del alike[model.effects.index(effect)]
-                model, v = reduced, search.verdict(reduced)
-                search.say(f"{effect.effect} is superfluous: p = {v.p_value:.2g}")
+            model, v = _dropped(search, model, v, alike, effect, "is superfluous")
     return model, v
 
 
 def _without_doubtful(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
-    """`model` without the effects whose intervals hold nothing at all: they have only led the fit there."""
+    """`model` without the effects whose intervals hold nothing at all: they have only led the fit there.
+
+    Parameters each in doubt may be sure together.
+    """
     for effect in model.effects:
         names = [f"{effect.effect}.{name}" for name in effect.linear]
         away = (
             abs(model.fit.point[name] - search.plant.neutral(name)) / max(model.fit.sd[name], 1e-300) for name in names
         )
-        if max(away) > DOUBTFUL:
-            continue
-        reduced = search.without(model, effect)  # parameters each in doubt may be sure together
-        if reduced.heldout < model.heldout + SAME:
-            del alike[model.effects.index(effect)]
-            model, v = reduced, search.verdict(reduced)
-            search.say(f"{effect.effect} may be nothing: p = {v.p_value:.2g}")
+        if max(away) <= DOUBTFUL:
+            model, v = _dropped(search, model, v, alike, effect, "may be nothing")
     return model, v
+
+
+def _dropped(
+    search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]], effect: Candidate, why: str
+) -> tuple[Model, Verdict]:
+    """`model` without one of its effects, unless more is left without it."""
+    reduced = search.without(model, effect)
+    if reduced.heldout >= model.heldout + SAME:
+        return model, v
+    del alike[model.effects.index(effect)]
+    v = search.verdict(reduced)
+    search.say(f"{effect.effect} {why}: p = {v.p_value:.2g}")
+    return reduced, v
 
 
 def _with_zero(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
