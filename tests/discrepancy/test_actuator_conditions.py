@@ -12,6 +12,9 @@ from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.conditions import as_recorded, current_noise, position_noise, supply_voltage
 from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.examine import examine
+from ema.discrepancy.actuator.fit import excess_at
+from ema.discrepancy.actuator.noise import Noise
+from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.zeros import zero_apart
 
 
@@ -183,3 +186,17 @@ def test_a_recorder_with_the_command_a_sample_late_is_a_condition_and_no_cause(h
     assert findings.verdict == ("explained" if findings.effects else "adequate")
     assert any("1 sample late" in note for note in findings.notes)
     assert findings.gain.k_after[2] == pytest.approx(0.03, abs=3e-3)
+
+
+@pytest.mark.slow
+def test_late_comparators_that_went_on_switching_at_rest_do_so_in_the_simulation(hidden, shipped_plant):
+    """Within their band no current flows unless they had begun; the truth itself had left a misfit of 140."""
+    rng = np.random.default_rng([27, 1, *b"comparator_delay"])
+    motions, bench = hidden.drawn_motions(rng), hidden.drawn_bench(rng)
+    flaws = hidden.Flaws(reaction=2.91e-6, k5=0.0225, k6=0.0209)
+    cycles = hidden.cycles(flaws, 4, 27, motions, bench)[2:]
+    data = measured(shipped_plant, [Record(tuple(Cycle(number, c) for number, c in enumerate(cycles)))])
+    assert np.abs(data.holding[1]).max() > 0.1
+    truth = {"comparator_delay.time": 2.91e-6, "k5": 0.0225, "k6": 0.0209}
+    plant = EmaPlant(as_recorded(shipped_plant, data.signals)[0], data)
+    assert excess_at(plant, Noise(plant, truth), truth, [1]) < 1.0

@@ -25,6 +25,7 @@ Steps = tuple[float, ...] | None  # None: the plant's
 STEPS = (1e-6, 8e-7)  # [s] integration steps of a mean
 NOISE_STEPS = (1e-6, 5e-7, 8e-7, 2e-6)  # [s] integration steps of runs that tell the noise
 CHUNK = 64  # runs in memory at a time
+CARRIED = 0.03  # [A] at the start, that tells that comparators are switching
 ENVELOPE_STEP = 10  # the envelope is low-passed at 200 Hz: every tenth sample says all
 
 
@@ -102,7 +103,9 @@ class EmaPlant:
         start = hf.start_at(self.plant, d.start[cycles_, 0] + zero + unseen, theta_m)
         start[:, STATE.index("w_m")] = d.speed[cycles_]
         start[:, STATE.index("w_u")] = d.user_speed[cycles_]
+        legs = self._legs(points, cycles_)
         for j, phase in enumerate("abc"):  # the current that held it before
+            start[:, STATE.index(f"s_{phase}")] = legs[:, j]
             for name in ("i", "lag1", "lag2"):
                 start[:, STATE.index(f"{name}_{phase}")] = d.holding[cycles_, j]
         all_features, all_envelopes = [], []
@@ -173,6 +176,17 @@ class EmaPlant:
             for parameter, value in self.plant.effects.get(effect, {}).items():
                 given.setdefault(parameter, np.full(len(points), value))
         return effects
+
+    def _legs(self, points: Sequence[Point], cycles: np.ndarray) -> Array:
+        """State of the three legs at the start, shape (n, 3).
+
+        Within the comparators' band a motor at rest is without current, all legs alike, unless comparators that answer
+        late go on switching as they had begun: then it carries what the controller asks for, and the record shows it.
+        """
+        name, holding = "comparator_delay.time", self.data.holding[cycles]
+        late = np.array([p.get(name, self.neutral(name)) for p in points]) > 0.0
+        switching = late & (np.abs(holding).max(axis=1) > CARRIED)
+        return np.where(switching[:, None] & (holding < 0.0), -1.0, 1.0)
 
     def _zero_error(self, points: Sequence[Point]) -> Array:
         """By how much the zero of the recorded rotor angle is off, for each run. [rad]"""
