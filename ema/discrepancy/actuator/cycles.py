@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema.core.errors import RecordError
+from ema.core.names import FAULTS
 from ema.core.records import Cycle, Record, require
 from ema.models.actuator import Actuator
 from ema.models.envelope import envelope
 from ema.models.turns import nearest_turn
 
 from .features import Array, Signals, features, motor_torque, stacked
+from .sampling import between, positions_every
 from .zeros import zero_apart
 
 REQUIRED = ("t", "i_a", "i_b", "i_c", "theta_m", "theta_u", "theta_cmd")
@@ -66,6 +68,10 @@ class Measured:
         White noise of the recorded rotor angle, 0 if less than its motion hides. [rad rms]
     zero : float
         θ_m/GR less θ_u in the middle of the play, 0 if not clear. [rad]
+    every : int
+        Samples from one recorded position to the next, where the record holds straight lines between them; else 1.
+    faults : array, shape (n_cycles, 6)
+        What each cycle's faults differ by from those of the record.
     """
 
     labels: tuple[str, ...]
@@ -83,6 +89,8 @@ class Measured:
     angle_step: float
     angle_noise: float
     zero: float
+    every: int
+    faults: Array
 
     @property
     def n_cycles(self) -> int:
@@ -115,6 +123,8 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
             labels.append(where)
             everything.append((s, cycle))
     signals = [s for s, _ in everything]
+    every = positions_every(signals[0].theta_m[0])
+    commands = [between(c, every, _step(c[::every])) for c in commands]
     rest = max(1, round(AT_REST * plant.control.rate))
     user = np.array([_user_at_start(s.theta_u[0], plant.control.rate) for s in signals])
     start = np.column_stack([user[:, 0], [s.theta_m[0, 0] for s in signals]])
@@ -134,9 +144,11 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
         holding - holding.mean(axis=1, keepdims=True),
         dT,
         with_temperature,
-        _step(np.concatenate([cycle["theta_m"] for _, cycle in everything])),
-        _white_noise([s.theta_m[0] for s in signals]),
+        _step(np.concatenate([cycle["theta_m"][::every] for _, cycle in everything])),
+        _white_noise([s.theta_m[0] for s in signals]) if every == 1 else 0.0,
         zero_apart(plant, signals),
+        every,
+        np.zeros((len(labels), len(FAULTS))),
     )
 
 
@@ -196,7 +208,7 @@ def _user_at_start(theta_u: Array, rate: float) -> tuple[float, float]:
 
 def _step(x: Array) -> float:
     """Resolution of a channel: the smallest step between its values if all values are multiples of it, else 0."""
-    values = np.unique(x)
+    values = np.unique(np.round(x, 10))  # interpolation leaves rounding
     if len(values) < 3:
         return 0.0
     step = float(np.diff(values).min())

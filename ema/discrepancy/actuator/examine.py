@@ -21,6 +21,7 @@ from .cycles import Measured
 from .extension import as_extension
 from .fit import Fit
 from .gear import swinging
+from .growing import growing, said
 from .noise import N_RUNS_SURE, Noise, Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
 from .select import CHANCE, FAR, FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, NEARLY_ALL, Model, Search, start_model
@@ -116,7 +117,16 @@ def examine(
     ema = EmaPlant(plant, data, n_threads)
     say("switching noise")
     search = Search(ema, Noise(ema, {}), train, heldout, say)
-    path = _shortest(search, _faults_only(search))
+    paths = _faults_only(search, {})
+    if not paths[0].verdict.is_noise and (grown := growing(search, paths[0].before)) is not None:
+        of_each = grown + [paths[0].before.fit.point[name] for name in FAULTS]
+        conditions.append(said(of_each))
+        mean = of_each.mean(axis=0)
+        expected = dict(zip(FAULTS, mean.tolist(), strict=True))
+        search = _anew(search, replace(data, faults=of_each - mean), expected)
+        ema = search.plant
+        paths = _faults_only(search, expected)
+    path = _shortest(search, paths)
     _resume(search, path)
     before, alike = path.before, path.alike
     after, v = settled, _ = _settled(search, path.after, path.verdict)
@@ -150,17 +160,25 @@ def examine(
     return Examination(findings, search, before, after, path.verdict_before, v)
 
 
-def _faults_only(search: Search) -> list[Path]:
-    """Paths that begin with faults alone: what they make of the noise weighs what tells them; both are found in turn.
+def _anew(search: Search, data: Measured, faults: Point) -> Search:
+    """A search from the beginning, with cycles that are otherwise prepared, and the noise of some faults."""
+    plant = EmaPlant(search.plant.plant, data, search.plant.n_threads)
+    return Search(plant, Noise(plant, faults), search.train, search.heldout, search.say)
+
+
+def _faults_only(search: Search, faults: Point) -> list[Path]:
+    """Paths that begin with faults alone, from where these are expected.
+
+    What faults make of the noise weighs what tells them; both are found in turn.
 
     Where that leads nowhere near the data, the faults found stand for something else. Then the noise may be what it is
     without faults, or what they make of it: friction or drag, whatever their cause, change it hundredfold.
     """
-    model = start_model(search)
+    model = start_model(search, faults)
     late = samples_late(search.plant, search.noise, model.fit.point, search.train) if model.excess > NEARLY else 0
     if late:
         search.plant.late = late
-        model = start_model(search)
+        model = start_model(search, faults)
     nominal = Path.of(search, model)
     if nominal.verdict.is_noise and max(model.fit.point.get(name, 0.0) for name in FAULTS) < FAULT_ALARM:
         return [nominal]

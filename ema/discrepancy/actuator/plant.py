@@ -19,6 +19,7 @@ from ema.models.layout import STATE
 
 from .cycles import Measured
 from .features import Array, Signals, features, floors, slices, stacked
+from .sampling import straightened
 
 Point = Mapping[str, float]
 Steps = tuple[float, ...] | None  # None: the plant's
@@ -95,9 +96,11 @@ class EmaPlant:
         zero_error = self._zero_error(points)
         zero = d.zero - zero_error / self.plant.transmission.GR  # of the user's sensor, if the rotor's is off by that
         command = np.array([d.commands[d.motion[c]] for c in cycles]) + zero[:, None]
-        k = np.array([[point.get(name, 0.0) for name in FAULTS] for point in points])
-        effects = self._effects(points)
+        recorded = command if d.every == 1 else np.array([d.signals[c].theta_cmd[0] for c in cycles]) + zero[:, None]
         cycles_ = np.asarray(cycles)
+        k = np.array([[point.get(name, 0.0) for name in FAULTS] for point in points])
+        k = np.clip(k + d.faults[cycles_], 0.0, 1.0)
+        effects = self._effects(points)
         unseen = self.plant.sensors.lvdt_step * np.array([np.random.default_rng(s).random() - 0.5 for s in seeds])
         theta_m = d.start[cycles_, 1] - zero_error - self._wobble(points, cycles_)
         start = hf.start_at(self.plant, d.start[cycles_, 0] + zero + unseen, theta_m)
@@ -129,7 +132,8 @@ class EmaPlant:
             if d.angle_step:
                 theta_m = d.angle_step * np.round(theta_m / d.angle_step)
             u_dc = r.u_dc if d.signals[cycles[0]].u_dc is not None else None
-            signals = Signals(r.i, theta_m, r.theta_u, command[part], u_dc)
+            theta_m, theta_u = (straightened(x, d.every) for x in (theta_m, r.theta_u))
+            signals = Signals(r.i, theta_m, theta_u, recorded[part], u_dc)
             all_features.append(stacked(features(self.plant, signals)))
             all_envelopes.append(r.envelope[:, ::ENVELOPE_STEP])
         self.n_runs += n

@@ -485,6 +485,6 @@ def _does_as_well(simpler: Screened, s: Screened, hardly: float) -> bool:
     return simpler.candidate.effect == s.candidate.effect and fewer and simpler.promised < s.promised + hardly
 
 
-def start_model(search: Search) -> Model:
-    """Faults only."""
-    return search.model((), K_FREE, {}, None, 5)
+def start_model(search: Search, faults: Point) -> Model:
+    """Faults only, from where they are expected."""
+    return search.model((), K_FREE, faults, None, 5)

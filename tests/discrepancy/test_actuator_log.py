@@ -1,0 +1,63 @@
+"""Records as the bus makes them, positions every millisecond, and faults that grow on the way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema.core.records import Cycle, Record
+from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.examine import examine
+from ema.discrepancy.actuator.sampling import between, positions_every
+
+
+def from_the_bus(channels):
+    """Every tenth position in steps of the frames' resolution, straight lines between them."""
+    t = np.arange(len(channels["t"]))
+    steps = {"theta_m": 2.0 * np.pi / 65536, "theta_u": 1.5e-5, "theta_cmd": 1.5e-5}
+    seen = {name: step * np.round(channels[name][::10] / step) for name, step in steps.items()}
+    return {**channels, **{name: np.interp(t, t[::10], x) for name, x in seen.items()}}
+
+
+def record(cycles):
+    return Record(tuple(Cycle(number, from_the_bus(c)) for number, c in enumerate(cycles)))
+
+
+def test_positions_that_come_less_often_are_noticed(hidden):
+    (cycle,) = hidden.cycles(hidden.Flaws(), 1, 3)
+    assert positions_every(cycle["theta_m"]) == 1
+    assert positions_every(from_the_bus(cycle)["theta_m"]) == 10
+
+
+def test_the_command_is_known_better_than_its_resolution(hidden):
+    command = hidden.chirp()
+    seen = from_the_bus({name: command for name in ("t", "theta_m", "theta_u", "theta_cmd")})["theta_cmd"]
+    assert np.std(between(seen, 10, 1.5e-5) - command) < 0.5 * np.std(seen - command)
+
+
+@pytest.mark.slow
+def test_a_sound_actuator_is_adequate_from_the_bus_too(hidden, shipped_plant):
+    cycles = hidden.cycles(hidden.Flaws(k1=0.03), 3, 5, (hidden.chirp(),))
+    findings = examine(shipped_plant, measured(shipped_plant, [record(cycles)])).findings
+    assert findings.verdict == "adequate"
+    assert findings.gain.k_before == pytest.approx((0.03, 0.0, 0.0, 0.0, 0.0, 0.0), abs=0.006)
+
+
+@pytest.mark.slow
+def test_faults_that_grow_are_no_flaw_of_the_simulation(hidden, shipped_plant):
+    cycles = [hidden.cycles(hidden.Flaws(k1=0.02 * n, k3=0.03 * n), 1, 5 + n, (hidden.chirp(),))[0] for n in range(4)]
+    findings = examine(shipped_plant, measured(shipped_plant, [record(cycles)])).findings
+    assert findings.verdict == "adequate"
+    assert findings.gain.k_before == pytest.approx((0.03, 0.0, 0.045, 0.0, 0.0, 0.0), abs=0.006)
+    (told,) = (note for note in findings.notes if "change from cycle to cycle" in note)
+    assert "k1" in told
+    assert "k3" in told
+    assert "k2" not in told
+
+
+@pytest.mark.slow
+def test_an_effect_is_named_from_the_bus_too(hidden, shipped_plant):
+    cycles = hidden.cycles(hidden.Flaws(viscous=6e-5, k1=0.03), 3, 5, (hidden.chirp(),))
+    findings = examine(shipped_plant, measured(shipped_plant, [record(cycles)])).findings
+    assert [e.name for e in findings.effects] == ["viscous_drag"]
+    assert findings.effects[0].parameters["coefficient"].value == pytest.approx(6e-5, rel=0.02)
