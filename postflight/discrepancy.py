@@ -77,6 +77,8 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
     else:
         for sentence in findings.sentences():
             click.echo(sentence)
+        for note in findings.notes:
+            click.echo(f"- {note}")
         click.echo(f"{report}")
 
 
