@@ -260,7 +260,8 @@ def _grown(
             search.noise = Noise(search.plant, after.fit.point)
             near = [search.model(m.effects, m.fit.free, m.fit.point, m.fit.columns, 2) for m in near]
             after, *rivals = sorted(near, key=lambda m: m.heldout)
-        alike.append(tuple(m.names[-1] for m in rivals if _is_alike(m, after)))
+        rivals = [m for m in rivals if _is_alike(m, after) and not _may_be_nothing(search, m, m.effects[-1])]
+        alike.append(tuple(m.names[-1] for m in rivals))
         after, v = _surely(search, after, search.verdict(after))
         if not v.is_noise:
             after, v = _as_on_the_bench(search, after, v, PLAIN)
@@ -299,7 +300,8 @@ def _leaving_noise(search: Search, models: Sequence[Model], after: Model) -> lis
 
 def _is_alike(model: Model, best: Model) -> bool:
     """Whether a model leaves little more than the best, or nothing as well."""
-    return model.excess < CHANCE or model.heldout - best.heldout < ALIKE * best.excess + CHANCE
+    more = SLACK if model.excess < CHANCE else CHANCE
+    return model.heldout - best.heldout < ALIKE * best.excess + more
 
 
 def _with_own_noise(search: Search, models: list[Model], after: Model) -> list[Model]:
@@ -430,18 +432,18 @@ def _without_superfluous(
 
 
 def _without_doubtful(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
-    """`model` without the effects whose intervals hold nothing at all: they have only led the fit there.
-
-    Parameters each in doubt may be sure together.
-    """
+    """`model` without the effects whose intervals hold nothing at all: they have only led the fit there."""
     for effect in model.effects:
-        names = [f"{effect.effect}.{name}" for name in effect.linear]
-        away = (
-            abs(model.fit.point[name] - search.plant.neutral(name)) / max(model.fit.sd[name], 1e-300) for name in names
-        )
-        if max(away) <= DOUBTFUL:
+        if _may_be_nothing(search, model, effect):
             model, v = _dropped(search, model, v, alike, effect, "may be nothing")
     return model, v
+
+
+def _may_be_nothing(search: Search, model: Model, effect: Candidate) -> bool:
+    """Whether the intervals of an effect hold nothing at all. Parameters each in doubt may be sure together."""
+    names = [f"{effect.effect}.{name}" for name in effect.linear]
+    away = (abs(model.fit.point[name] - search.plant.neutral(name)) / max(model.fit.sd[name], 1e-300) for name in names)
+    return max(away) <= DOUBTFUL
 
 
 def _dropped(
@@ -480,7 +482,10 @@ def _settled(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     if not model.effects or model.excess > DISTANT:
         return model, v
     found = search.settled(model)
-    return (model, v) if found.heldout > model.heldout + CHANCE else (found, search.verdict(found))
+    if found.heldout <= model.heldout + CHANCE:
+        return found, search.verdict(found)
+    sd = {name: max(x, found.fit.sd[name]) for name, x in model.fit.sd.items()}  # the record tells no better
+    return replace(model, fit=replace(model.fit, sd=sd)), v
 
 
 def _still_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...]) -> tuple[str, ...]:
@@ -548,6 +553,7 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
     kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c.effect != "torque_line" and c not in odd]
     rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
     found = [_found(search, after, c.effect, a, rest) for c, a in kept]
+    found = [_whatever_the_cause(search, after, e, kept) for e in found]
     if too_little and found:
         notes.append(
             f"{', '.join(e.name for e in found)} would explain {share:.0%} of the rest: too little to be named"
@@ -625,6 +631,25 @@ def _found(
             )
     confidence, *_ = _confidence(search, model, effect)
     return FoundEffect(e.name, confidence, alike, parameters, e.said(values), e.separated_by)
+
+
+def _whatever_the_cause(
+    search: Search, model: Model, found: FoundEffect, kept: Sequence[tuple[Candidate, tuple[str, ...]]]
+) -> FoundEffect:
+    """`found` with intervals that hold its parameters beside the rivals of the other effects too."""
+    parameters = dict(found.parameters)
+    for other, rivals in kept:
+        for rival in rivals if other.effect != found.name else ():
+            names = {rival if name == other.effect else name for name in model.names}
+            beside = [m for m in search.tried if len(m.names) == len(model.names) and set(m.names) == names]
+            if not beside:  # faults, or the zero of a sensor
+                continue
+            fit = min(beside, key=lambda m: m.heldout).fit
+            for name, q in parameters.items():
+                p = f"{found.name}.{name}"
+                x, reach = fit.point.get(p, q.value), 1.96 * fit.sd.get(p, 0.0)
+                parameters[name] = replace(q, low=min(q.low, x - reach), high=max(q.high, x + reach))
+    return replace(found, parameters=parameters)
 
 
 def _confidence(search: Search, model: Model, effect: str, *rivals: str) -> list[float]:

@@ -271,9 +271,10 @@ class Search:
                 others[s.candidate.effect] = self._refined(model, s)
         refined |= others
         best = min(refined.values(), key=lambda m: m.heldout)
-        for s in self._looking_like(model, best, [s for s in screened if s.candidate.effect not in refined]):
-            if s.candidate.effect not in refined:
-                refined[s.candidate.effect] = self._refined(model, s)
+        for s in self._looking_like(model, best, screened, set(refined)):
+            m = self._refined(model, s)
+            effect = s.candidate.effect
+            refined[effect] = min(m, refined.get(effect, m), key=lambda x: x.heldout)
         # A rival is out only if it leaves more when fitted as well as the best.
         for name, m in self._close(refined, model):
             again = self.model(m.effects, m.fit.free, m.fit.point, None, 4)
@@ -317,31 +318,42 @@ class Search:
             return None
         return self.model(made.effects, made.fit.free, made.fit.point, made.fit.columns, 7)
 
-    def _looking_like(self, model: Model, best: Model, screened: Sequence[Screened]) -> list[Screened]:
+    def _looking_like(
+        self, model: Model, best: Model, screened: Sequence[Screened], fitted: set[str]
+    ) -> list[Screened]:
         """Those that can do, beside what else is free, nearly all that the last effect of `best` does.
 
         What probes do where nothing else acts may mislead: what resembles the effect there is asked once more where
-        `best` is, and begins with what does the same there.
+        `best` is, and begins with what does the same there. So is what was fitted already, if the effect has taken the
+        place of faults: from these no fit gets there.
         """
         effect = best.effects[-1]
         names = [f"{effect.effect}.{name}" for name in effect.linear]
         values = np.array([best.fit.point[name] - self.plant.neutral(name) for name in names])
         frees = [f for f in best.fit.free if f.name in names]
         done = stacked_jacobian(self.noise, frees, best.fit.columns, self.train) @ values
+        replaced = effect.faults if self._stands_for_faults(model, effect) else []
         others, rest = _stripped(best, effect)[1:]
-        own = stacked_jacobian(self.noise, model.fit.free, model.fit.columns, self.train)
+        free, others = (tuple(f for f in of if f.name not in replaced) for of in (model.fit.free, others))
+        own = stacked_jacobian(self.noise, free, model.fit.columns, self.train)
         own_there = stacked_jacobian(self.noise, others, best.fit.columns, self.train)
-        found = []
+        found: dict[str, Screened] = {}
         for s in screened:
             c = s.candidate
-            share, _ = _doing(done, self._columns(c), own)
-            if share > COLLINEAR:
-                found.append(s)
+            if c.effect in found or c.effect == effect.effect or (c.effect in fitted and not replaced):
+                continue
+            share = _doing(done, self._columns(c), own)
+            if share > COLLINEAR and c.effect not in fitted:
+                found[c.effect] = s
             elif share > RESEMBLING:
-                share, values = _doing(done, self._columns_at(best.fit.point, c), own_there)
-                if share > COLLINEAR:
-                    found.append(s._replace(start={**rest, **c.start(np.clip(values, *c.limits()))}))
-        return found
+                J = self._columns_at(best.fit.point, c)
+                if _doing(done, J, own_there) > COLLINEAR:
+                    limits = zip(bounds(others, rest), c.limits(), strict=True)
+                    low, high = (np.concatenate(ends) for ends in limits)
+                    step, _ = bounded(np.concatenate([own_there, J], axis=1), done, low, high)
+                    start = {**moved(rest, others, step[: len(others)]), **c.start(step[len(others) :])}
+                    found[c.effect] = s._replace(start=start)
+        return list(found.values())
 
     def _columns_at(self, point: Point, c: Candidate) -> Array:
         """Whitened columns (per unit) of a candidate beside all that a point has."""
@@ -440,12 +452,12 @@ class Search:
         return n * float(np.expm1(total / n))
 
 
-def _doing(done: Array, columns: Array, own: Array) -> tuple[float, Array]:
-    """What share of something columns can do beside others, and the values with which they do."""
+def _doing(done: Array, columns: Array, own: Array) -> float:
+    """What share of something columns can do beside others."""
     Q, _ = np.linalg.qr(own)
     done, columns = (x - Q @ (Q.T @ x) for x in (done, columns))
-    values = np.asarray(np.linalg.lstsq(columns, done, rcond=None)[0])
-    return float(np.linalg.norm(columns @ values)) / max(float(np.linalg.norm(done)), 1e-300), values
+    values = np.linalg.lstsq(columns, done, rcond=None)[0]
+    return float(np.linalg.norm(columns @ values)) / max(float(np.linalg.norm(done)), 1e-300)
 
 
 def _common(model: Model, c: Candidate) -> tuple[float, list[str]]:
