@@ -66,6 +66,7 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
             status.update(text)
 
         findings, draw = examiner.discrepancy(plant_file, read, say)
+        findings.notes.extend(_left_out(read, cycles))
         findings.write(findings_file)
         found = [*findings.effects, *findings.unnamed]
         write_extended(plant_file, found, extended, findings.fitted)
@@ -93,8 +94,15 @@ def _chosen(records: list[Record], numbers: str | None) -> list[Record]:
     chosen = [replace(r, cycles=tuple(c for c in r if c.number in wanted)) for r in records]
     if missing := wanted - {c.number for r in chosen for c in r}:
         there = sorted({c.number for r in records for c in r})
+        broken = missing & {number for r in records for number in r.broken}
+        why = "was left out: frames of it are missing" if broken else "is not in the records"
         raise RecordError(
-            f"cycle {min(missing)} is not in the records, or not whole (there are {len(there)}: "
-            f"{there[0]} … {there[-1]})"
+            f"cycle {min(broken or missing)} {why} (there are {len(there)} whole ones: {there[0]} … {there[-1]})"
         )
     return [r for r in chosen if r.n_cycles]
+
+
+def _left_out(records: list[Record], chosen: str | None) -> list[str]:
+    """What is said of cycles with gaps, where all cycles were asked for."""
+    told = ((r.name, len(r.broken), r.n_cycles) for r in records if r.broken and chosen is None)
+    return [f"{name}: {n} of {n + n_whole} cycles have gaps and were left out" for name, n, n_whole in told]

@@ -73,13 +73,14 @@ class Record:
     """Cycles of (possibly) unequal length with the same channels.
 
     `ignored` names the columns of the file that are not channels; `resolution` the steps of the measurement
-    where they are known [unit of the channel].
+    where they are known [unit of the channel]; `broken` the numbers of cycles that were left out for their gaps.
     """
 
     cycles: tuple[Cycle, ...]
     source: Path | None = None
     ignored: tuple[str, ...] = ()
     resolution: Mapping[str, float] = field(default_factory=dict)
+    broken: tuple[int, ...] = ()
 
     @property
     def channels(self) -> tuple[str, ...]:

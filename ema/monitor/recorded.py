@@ -39,7 +39,8 @@ def read_mcap(path: Path) -> Record:
     """
     with LogReader(path) as log:
         found: dict[int, list[Cycle]] = {}
-        for actuator, cycle in cycles(log):
+        broken: list[int] = []
+        for actuator, cycle in cycles(log, broken):
             found.setdefault(actuator, []).append(cycle)
             if len(found) > 1:
                 numbers = " and ".join(map(str, sorted(found)))
@@ -48,30 +49,42 @@ def read_mcap(path: Path) -> Record:
                 )
     if not found:
         raise RecordError(f"{path}: no cycle without a gap in it")
-    return Record(tuple(next(iter(found.values()))), path)
+    return Record(tuple(next(iter(found.values()))), path, broken=tuple(broken))
 
 
-def cycles(log: LogReader) -> Iterator[tuple[int, Cycle]]:
-    """Actuator number and cycle, in the order they ended. RecordError when the log does not say whose they are."""
+def cycles(log: LogReader, broken: list[int] | None = None) -> Iterator[tuple[int, Cycle]]:
+    """Actuator number and cycle, in the order they ended; numbers of cycles with gaps are added to `broken`.
+
+    Raises
+    ------
+    RecordError
+        The log does not say whose the cycles are.
+    """
     codec = codecs.default()
     plants = _plants(log)
     assembler = Assembler(codec, plants, MonitorSettings())
     supply: dict[int, dict[str, float]] = {}
+    broken = [] if broken is None else broken
     for _, frames in log.frames():
         closed = [item for item in assembler.feed(frames) if isinstance(item, AssembledCycle)]
-        yield from _whole(closed, plants, supply)
+        yield from _whole(closed, plants, supply, broken)
         _hear(codec, frames, supply)
     closed = [item for item in assembler.finish() if isinstance(item, AssembledCycle)]
-    yield from _whole(closed, plants, supply)
+    yield from _whole(closed, plants, supply, broken)
 
 
 def _whole(
-    closed: list[AssembledCycle], plants: dict[int, Actuator], supply: dict[int, dict[str, float]]
+    closed: list[AssembledCycle],
+    plants: dict[int, Actuator],
+    supply: dict[int, dict[str, float]],
+    broken: list[int],
 ) -> Iterator[tuple[int, Cycle]]:
     for cycle in closed:
         motion = np.array([cycle.motion[name] for name in ("theta_u", "theta_m", "theta_cmd")])
         if not cycle.missing.any() and np.isfinite(motion).all():
             yield cycle.actuator, _cycle(cycle, plants[cycle.actuator], supply.get(cycle.actuator, {}))
+        else:
+            broken.append(cycle.span.cycle)
 
 
 def _cycle(cycle: AssembledCycle, plant: Actuator, supply: dict[str, float]) -> Cycle:

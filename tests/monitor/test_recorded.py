@@ -49,6 +49,7 @@ def test_a_cycle_with_a_gap_is_left_out(fly, coarse_bundle, tmp_path):
     flight[1] = (flight[1][0], np.delete(currents, 100))
     record = read_record(_log(tmp_path / "log", flight, coarse_bundle))
     assert [cycle.number for cycle in record] == [0, 2]
+    assert record.broken == (1,)
 
 
 def test_a_log_that_does_not_say_whose_cycles_is_refused(fly, tmp_path):

@@ -26,6 +26,7 @@ from .noise import N_RUNS_SURE, Noise, Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
 from .select import CHANCE, FAR, FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, NEARLY_ALL, Model, Search, start_model
 from .structure import structure
+from .thinning import thinned
 from .timing import samples_late
 
 MIN_CYCLES = 2
@@ -111,8 +112,11 @@ def examine(
         raise RecordError(
             f"{data.labels[0]}: is the only cycle; at least {MIN_CYCLES} are needed, to test on one what another says"
         )
+    data, left_out = thinned(data)
     train, heldout = split(data)
     plant, conditions = as_recorded(plant, data.signals)
+    if left_out:
+        conditions.append(left_out)
     data = swinging(plant, data)
     ema = EmaPlant(plant, data, n_threads)
     say("switching noise")

@@ -12,9 +12,11 @@ from scipy.stats import gamma
 from .cycles import Measured
 from .features import Array
 from .plant import EmaPlant, Point
+from .thinning import spread
 
 N_RUNS = 96, 48  # for the covariance, for the null distribution
 N_RUNS_SURE = 288, 192  # where it is close
+N_CYCLES = 6  # of a motion that are simulated for its noise: deviations from the mean of too few runs are alike
 SEED = 7_000_000
 FALSE_ALARMS = 0.004  # of the whole verdict; the aim is 1 %, and the null distribution is itself estimated
 
@@ -67,13 +69,13 @@ def shrinkage(z: Array) -> float:
 
 
 def motion_noise(plant: EmaPlant, point: Point, motion: int, n_runs: tuple[int, int] = N_RUNS) -> MotionNoise:
-    """Simulate the cycles of a motion many times and describe how runs of one cycle differ.
+    """Simulate cycles of a motion many times and describe how runs of one cycle differ.
 
     Beside what is random stands what no record tells: the grid on which the comparators are evaluated. It rounds every
     switching instant, which shifts local means of the current by up to a quarter of (slope × step), alike in every run
     with this step. So runs have several steps, and what the step makes is part of the noise.
     """
-    cycles = np.flatnonzero(plant.data.motion == motion)
+    cycles = spread(np.flatnonzero(plant.data.motion == motion), N_CYCLES)
     each = -(-sum(n_runs) // len(cycles))
     of = np.repeat(cycles, each)
     n = len(of)
