@@ -111,3 +111,11 @@ def quantity(unit: str, meaning: str, default: Any = ..., **bounds: Any) -> Any:
         json_schema_extra={"unit": unit},
         **bounds,
     )
+
+
+def plain(value: Any) -> Any:
+    """A number without a unit, where the unit is not known when a file is read; ValueError for a text with one."""
+    try:
+        return float(value) if isinstance(value, str) else value
+    except ValueError:
+        raise ValueError("a number without a unit is wanted here, in the effect's own unit (SI)") from None

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import BeforeValidator, Field, FiniteFloat, model_validator
 
 from ema.core.config import Settings
-from ema.core.units import quantity
+from ema.core.units import plain, quantity
 
 
 class Motor(Settings):
@@ -100,7 +100,7 @@ class Actuator(Settings):
     control: Control
     sensors: Sensors
     motion: Motion
-    effects: dict[str, dict[str, FiniteFloat]] = Field(
+    effects: dict[str, dict[str, Annotated[FiniteFloat, BeforeValidator(plain)]]] = Field(
         default_factory=dict, description="terms beyond the nominal model"
     )
     intervals: dict[str, dict[str, tuple[float, float]]] = Field(

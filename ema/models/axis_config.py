@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 from ema.core import config
 from ema.core.config import Settings
 from ema.core.names import CHANNELS
-from ema.core.units import quantity, to_unit
+from ema.core.units import plain, quantity, to_unit
 from ema.effects import checked
 from ema.effects.torque_term import COLUMNS
 
@@ -49,7 +49,9 @@ class Axis(Settings):
     window: float | None = quantity(
         "s", "length of the parts of a record that are simulated on their own; chosen if not given", None, gt=0, le=1e3
     )
-    effects: dict[str, dict[str, float]] = Field(default_factory=dict, description="terms beyond the nominal model")
+    effects: dict[str, dict[str, Annotated[float, BeforeValidator(plain)]]] = Field(
+        default_factory=dict, description="terms beyond the nominal model"
+    )
     intervals: dict[str, dict[str, tuple[float, float]]] = Field(
         default_factory=dict, exclude=True, description="of 95 %, of the effects' parameters, where they were measured"
     )
@@ -67,7 +69,9 @@ class Axis(Settings):
 
     @field_validator("effects")
     @classmethod
-    def _known_effects(cls, effects: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
+    def _known_effects(
+        cls, effects: dict[str, dict[str, Annotated[float, BeforeValidator(plain)]]]
+    ) -> dict[str, dict[str, float]]:
         for key, values in effects.items():
             name = key.split(INSTANCE)[0]
             if key != name and name != "cogging":

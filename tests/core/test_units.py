@@ -1,6 +1,6 @@
 import pytest
 
-from ema.core.units import convert, to_unit
+from ema.core.units import convert, plain, to_unit
 
 
 @pytest.mark.parametrize(
@@ -46,3 +46,10 @@ def test_what_is_no_quantity_is_refused_and_not_calculated(text):
         to_unit(text, "s")
     with pytest.raises(ValueError, match="is not a known unit"):
         convert(text, "s")
+
+
+def test_where_no_unit_is_known_a_text_with_one_is_refused():
+    assert plain("6.0e4") == 6.0e4
+    assert plain(3) == 3
+    with pytest.raises(ValueError, match="a number without a unit is wanted here"):
+        plain("6e-5 N m s/rad")
