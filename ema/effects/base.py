@@ -44,6 +44,9 @@ HOOKS = MappingProxyType(
 )
 
 
+ABSENT = -1.0  # as the low end of a relative change: nothing is left, which is credible
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One number of an effect: `neutral` switches the effect off, `low`..`high` is what is physically credible.

@@ -5,12 +5,20 @@ What the controller sees is not filtered; only the record is.
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import ABSENT, Effect, Parameter
 
 EFFECT = Effect(
     name="current_filter",
     parameters=(
-        Parameter("change", "1", 0.0, -0.9, 3.0, 0.3, "relative change of the time constants of the anti-alias stages"),
+        Parameter(
+            "change",
+            "1",
+            0.0,
+            ABSENT,
+            3.0,
+            0.3,
+            "relative change of the time constants of the anti-alias stages; -1: none",
+        ),
     ),
     sentence="the time constants of the anti-alias filter of the recorded currents differ by {change:+.0%}",
     separated_by="a step of current with the rotor locked",

@@ -23,6 +23,7 @@ from .layout import ENERGIES, N_ROWS, N_STATE, STATE, row
 
 N_LANES = 16
 DT = 1e-6  # [s]
+NO_FILTER = 1e-6  # of the time constants: far below a step
 N_RING = 64  # control ticks remembered for delays
 
 Effects = Mapping[str, Mapping[str, float | np.ndarray]]
@@ -91,7 +92,7 @@ def parameters(plant: Actuator, k: np.ndarray, effects: Effects, dT: float | np.
         for parameter_name, value in values.items():
             z[row(f"{name}.{parameter_name}")] = value
     z[row("J_m")] *= 1.0 + z[row("inertia.change")]
-    z[row("f_lag")] /= 1.0 + z[row("current_filter.change")]
+    z[row("f_lag")] /= np.maximum(1.0 + z[row("current_filter.change")], NO_FILTER)
     return z
 
 

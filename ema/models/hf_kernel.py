@@ -130,7 +130,7 @@ def electrical_step(z, l, N, dt, parts, audited):
     z[I_A * N + l], z[I_B * N + l], z[I_C * N + l] = n_a, n_b, n_c
 
     # measured currents through two first-order anti-alias stages
-    g = TWO_PI * z[F_LAG * N + l] * dt
+    g = min(TWO_PI * z[F_LAG * N + l] * dt, 1.0)  # one: no filter that a step could resolve
     z[LAG1_A * N + l] += g * (x_a - z[LAG1_A * N + l])
     z[LAG1_B * N + l] += g * (x_b - z[LAG1_B * N + l])
     z[LAG1_C * N + l] += g * (x_c - z[LAG1_C * N + l])

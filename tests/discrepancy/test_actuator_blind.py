@@ -120,8 +120,9 @@ def test_both_lines_of_cogging_are_found(hidden, shipped_plant):
     [
         ({"reaction": 1.2e-6}, "comparator_delay", "time", 1.2e-6),
         ({"corner": 1500.0}, "current_filter", "change", 2000.0 / 1500.0 - 1.0),
+        ({"corner": 1e5}, "current_filter", "change", 2000.0 / 1e5 - 1.0),
     ],
-    ids=["comparators a step late", "slower filter of the recorder"],
+    ids=["comparators a step late", "slower filter of the recorder", "no filter to speak of"],
 )
 def test_what_another_bench_does_with_the_currents_is_named_and_the_fault_stays(
     hidden, shipped_plant, flaw, effect, parameter, value

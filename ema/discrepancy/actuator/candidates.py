@@ -24,6 +24,7 @@ from .weak import Torque, bumps, lines
 
 FLAT, FLAT_SAMPLES = 5e-3, 10  # [A] samples of one cycle at the largest current that make a clipped top
 CLIPPED_STEP = 0.05  # [A] of the finite difference of a converter's limit
+HARDLY_FILTERED = -0.97  # relative change of time constants
 SIZES = (0.5, 1.0, 2.0, 4.0)  # times the step of a probe: usual sizes of an effect
 ZERO_KNOWN = 3e-7  # [rad at the user] to which a record tells how far the zeros of its sensors lie apart
 WARMER = 3.0  # [K] spread of winding temperature below which nothing can be said about temperature
@@ -208,6 +209,12 @@ def _commutation(plant: Actuator, zero: float) -> Candidate:
     return Commutation(**vars(c), recorded=_electrical(plant, zero))
 
 
+def _without_filter() -> Candidate:
+    """Currents recorded as they are, or nearly: far from where the change of a filter has its column."""
+    frees = (free("current_filter.change", 0.02),)
+    return Candidate("current_filter", frees, {}, ("change",), (HARDLY_FILTERED,))
+
+
 def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line: str = "cogging") -> list[Candidate]:
     """What to try on these cycles; nonlinear parameters where the residual torque suggests them.
 
@@ -221,6 +228,7 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line:
         _plain("comparator_delay", "time"),
         _plain("constant_load", "torque"),
         _plain("current_filter", "change"),
+        _without_filter(),
         _plain("current_gain", "gain_a", "gain_b", "gain_c", step=dict.fromkeys(("gain_a", "gain_b", "gain_c"), 0.02)),
         _plain("current_offset", "offset_a", "offset_b", "offset_c"),
         _plain("dead_time", "time"),

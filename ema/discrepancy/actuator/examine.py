@@ -12,6 +12,7 @@ from ema.core.errors import RecordError
 from ema.core.names import FAULTS
 from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
 from ema.effects import registry
+from ema.effects.base import ABSENT
 from ema.models.actuator import Actuator
 
 from .candidates import Candidate, resolver_zero
@@ -258,12 +259,17 @@ def _grown(
         if not real:
             break
         after, *rivals = [m for m in real if _is_alike(m, real[0])]
-        if after.excess < NEW_NOISE * left:  # what runs differ by depends on the point, and so does every weight
+        # What runs differ by depends on the point, and so does every weight.
+        noise = Noise(search.plant, after.fit.point)
+        while min(after.excess, search.excess_by(noise, after)) < NEW_NOISE * left:
             near = [m for m in real if m in (after, *rivals) or m.excess < max(NEARLY, NEARLY_ALL * left)]
-            left = max(after.excess, CHANCE)
-            search.noise = Noise(search.plant, after.fit.point)
+            search.noise = noise
             near = [search.model(m.effects, m.fit.free, m.fit.point, m.fit.columns, 2) for m in near]
             after, *rivals = sorted(near, key=lambda m: m.heldout)
+            left = max(after.excess, CHANCE)
+            if left < SLACK:
+                break
+            real, noise = near, Noise(search.plant, after.fit.point)
         rivals = [m for m in rivals if _is_alike(m, after) and not _may_be_nothing(search, m, m.effects[-1])]
         alike.append(tuple(m.names[-1] for m in rivals))
         after, v = _surely(search, after, search.verdict(after))
@@ -511,7 +517,7 @@ def _is_credible(model: Model) -> bool:
     for p in registry()[effect].parameters:
         x = model.fit.point.get(f"{effect}.{p.name}")
         margin = 1e-3 * (p.high - p.low)
-        if x is not None and any(abs(x - end) < margin and end != p.neutral for end in (p.low, p.high)):
+        if x is not None and any(abs(x - end) < margin and end not in (p.neutral, ABSENT) for end in (p.low, p.high)):
             return False
     return True
 

@@ -122,6 +122,11 @@ class Search:
         self.say(f"{' + '.join(made.names) or 'faults only'}: held-out misfit {made.heldout:.3g}")
         return made
 
+    def excess_by(self, noise: Noise, model: Model) -> float:
+        """What `model` leaves on held-out cycles beyond another noise."""
+        left = residuals(self.plant, noise, model.fit.point, self.heldout, N_FINAL, FINAL_SEED)
+        return max(noise.misfit(list(left.values()), self.heldout) - 1.0, 0.0)
+
     def verdict(self, model: Model) -> Verdict:
         """Is what `model` leaves on all cycles noise?"""
         cycles = sorted(self.train + self.heldout)
