@@ -61,3 +61,22 @@ def test_an_effect_is_named_from_the_bus_too(hidden, shipped_plant):
     findings = examine(shipped_plant, measured(shipped_plant, [record(cycles)])).findings
     assert [e.name for e in findings.effects] == ["viscous_drag"]
     assert findings.effects[0].parameters["coefficient"].value == pytest.approx(6e-5, rel=0.02)
+
+
+@pytest.mark.slow
+def test_effects_are_named_beside_faults_that_grow(hidden, shipped_plant):
+    """Faults of each cycle stand for the drag too, at first; what grows is told as it does beside the drag."""
+    flaws = [hidden.Flaws(viscous=6e-5, k1=0.02 * n, k3=0.03 * n) for n in range(6)]
+    cycles = [hidden.cycles(f, 1, 5 + n, (hidden.chirp(),))[0] for n, f in enumerate(flaws)]
+    findings = examine(shipped_plant, measured(shipped_plant, [record(cycles)])).findings
+    assert findings.verdict == "explained"
+    assert [(e.name, e.indistinguishable_from) for e in findings.effects] == [("viscous_drag", ())]
+    assert findings.effects[0].parameters["coefficient"].value == pytest.approx(6e-5, rel=0.05)
+    assert findings.gain.k_after == pytest.approx((0.05, 0.0, 0.075, 0.0, 0.0, 0.0), abs=0.01)
+    (told,) = (note for note in findings.notes if "change from cycle to cycle" in note)
+    ranges = {
+        name: (float(low), float(high))
+        for name, low, _, high in (r.split() for r in told.split(": ")[1].split(";")[0].split(", "))
+    }
+    assert ranges["k1"] == pytest.approx((0.0, 0.1), abs=0.01)
+    assert ranges["k3"] == pytest.approx((0.0, 0.15), abs=0.01)

@@ -20,9 +20,10 @@ from .comparators import CLEAR, PLAIN, find_step, take_step
 from .conditions import as_recorded
 from .cycles import Measured
 from .extension import as_extension
+from .features import Array
 from .fit import Fit
 from .gear import swinging
-from .growing import growing, said
+from .growing import beside, growing, said
 from .noise import N_RUNS_SURE, Noise, Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
 from .select import CHANCE, FAR, FINAL_SEED, K_SEEN, MAX_EFFECTS, N_FINAL, NEARLY_ALL, Model, Search, start_model
@@ -50,6 +51,7 @@ DOUBTFUL = 2.0  # deviations from nothing, below which an effect is not named
 SLACK = 0.1  # misfit that switching noise may make
 ENVELOPE_SETTLING = 15e-3  # [s]
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
+N_BESIDE = 2  # turns in which faults of each cycle are found anew beside the effects
 NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none
 
 
@@ -123,16 +125,22 @@ def examine(
     say("switching noise")
     search = Search(ema, Noise(ema, {}), train, heldout, say)
     paths = _faults_only(search, {})
-    if not paths[0].verdict.is_noise and (grown := growing(search, paths[0].before)) is not None:
-        of_each = grown + [paths[0].before.fit.point[name] for name in FAULTS]
-        conditions.append(said(of_each))
-        mean = of_each.mean(axis=0)
-        expected = dict(zip(FAULTS, mean.tolist(), strict=True))
-        search = _anew(search, replace(data, faults=of_each - mean), expected)
-        ema = search.plant
-        paths = _faults_only(search, expected)
+    of_each = None if paths[0].verdict.is_noise else growing(search, paths[0].before)
+    if of_each is not None:
+        search = _with_faults(search, of_each, {})
+        paths = _faults_only(search, search.noise.point)
     path = _shortest(search, paths)
+    for turn in range(N_BESIDE):
+        if of_each is None or not path.after.effects or (turn and path.verdict.is_noise):
+            break
+        _resume(search, path)
+        of_each = beside(search, path.after)
+        search = _with_faults(search, of_each, path.after.fit.point)
+        path = _gone_on(search, path)
     _resume(search, path)
+    if of_each is not None:
+        conditions.append(said(of_each))
+    ema = search.plant
     before, alike = path.before, path.alike
     after, v = settled, _ = _settled(search, path.after, path.verdict)
     if not path.verdict_before.is_noise:
@@ -165,10 +173,27 @@ def examine(
     return Examination(findings, search, before, after, path.verdict_before, v)
 
 
-def _anew(search: Search, data: Measured, faults: Point) -> Search:
-    """A search from the beginning, with cycles that are otherwise prepared, and the noise of some faults."""
-    plant = EmaPlant(search.plant.plant, data, search.plant.n_threads)
-    return Search(plant, Noise(plant, faults), search.train, search.heldout, search.say)
+def _with_faults(search: Search, of_each: Array, point: Point) -> Search:
+    """A search from the beginning with faults of each cycle, shape (n_cycles, 6), and noise as at their mean."""
+    mean = of_each.mean(axis=0)
+    old = search.plant
+    plant = EmaPlant(old.plant, replace(old.data, faults=of_each - mean), old.n_threads)
+    plant.late = old.late
+    take_step(plant, old.step)
+    noise = Noise(plant, {**point, **dict(zip(FAULTS, mean.tolist(), strict=True))})
+    return Search(plant, noise, search.train, search.heldout, search.say)
+
+
+def _gone_on(search: Search, path: Path) -> Path:
+    """A path to its end from the effects that were found, after the cycles' faults were found anew beside them.
+
+    Odds stay those of what was tried beside the same faults.
+    """
+    before = start_model(search, {name: search.noise.point[name] for name in FAULTS})
+    after = search.model(path.after.effects, path.after.fit.free, search.noise.point, None, 4)
+    begun = Path.of(search, before)
+    begun = replace(begun, tried=path.tried, after=after, verdict=search.verdict(after))
+    return _gone(search, replace(begun, alike=path.alike, as_well=path.as_well))
 
 
 def _faults_only(search: Search, faults: Point) -> list[Path]:
@@ -222,13 +247,13 @@ def _resume(search: Search, path: Path) -> None:
 def _gone(search: Search, begun: Path) -> Path:
     """A path to its end: what explains the cycles."""
     _resume(search, begun)
-    before, verdict_before = _surely(search, begun.before, begun.verdict)
-    if not verdict_before.is_noise:
+    before, verdict_before = _surely(search, begun.before, begun.verdict_before)
+    if not verdict_before.is_noise and not begun.after.effects:
         before, verdict_before = _as_on_the_bench(search, before, verdict_before, PLAIN)
     search.say(f"faults only: p = {verdict_before.p_value:.2g}, most visible: {verdict_before.loudest}")
-    alike: list[tuple[str, ...]] = []
-    as_well: list[str] = []
-    after, v = _grown(search, before, before, verdict_before, alike)
+    alike, as_well = list(begun.alike), list(begun.as_well)
+    after, v = (begun.after, begun.verdict) if begun.after.effects else (before, verdict_before)
+    after, v = _grown(search, before, after, v, alike)
     if not v.is_noise:  # the library had its chance
         other, w = _as_on_the_bench(search, after, v)
         if other is not after:
@@ -674,7 +699,7 @@ def _confidence(search: Search, model: Model, effect: str, *rivals: str) -> list
         if len(m.names) > place and m.names[:place] == model.names[:place] and len(m.names) == place + 1:
             best[m.names[place]] = min(m.heldout, best.get(m.names[place], np.inf))
     own = best.get(effect, model.heldout)
-    least = min(own, *best.values())
+    least = min([own, *best.values()])
     more = {name: max(x - least - CHANCE, 0.0) for name, x in {**best, effect: own}.items()}
     odds = {name: np.exp(-0.5 * n * x / max(least, 1.0)) for name, x in more.items()}
     return [float(0.99 * odds.get(name, 0.0) / sum(odds.values())) for name in (effect, *rivals)]

@@ -1,12 +1,14 @@
 """Faults that grow while a record is made: the simulation may be right in every cycle, with faults of its own.
 
 Cycles of one motion differ by chance alone if nothing changes between them; no effect of the library makes them differ,
-but for those of temperature. Where they differ by more, and faults of each cycle explain that, these are no flaw.
+but for those of temperature. Where they differ by more, and with faults of each cycle they do not, these are no flaw.
+What all cycles leave alike is looked into beside them; faults of each have taken what they could of it, so they are
+found anew beside every effect.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -14,28 +16,40 @@ from ema.core.names import FAULTS
 
 from .candidates import WARMER
 from .features import Array
-from .fit import K_FREE, N_SEEDS, fit, residuals
-from .plant import Point
-from .select import NEARLY, Model, Search
+from .fit import K_FREE, N_SEEDS, Fit, fit, residuals
+from .select import Model, Search
 
 DIFFER = 1.5  # times what noise makes of the differences between cycles of one motion
 TOLD = 0.01  # range of a fault from which it is said to change
 
 
 def growing(search: Search, model: Model) -> Array | None:
-    """Faults of each cycle less those of `model`, shape (n_cycles, 6), if such explain what cycles differ by."""
-    data = search.plant.data
-    cycles = list(range(data.n_cycles))
-    if np.ptp(data.dT) > WARMER or _differ(search, model.fit.point) < DIFFER:
+    """Faults of each cycle, shape (n_cycles, 6), if these explain what cycles of one motion differ by."""
+    data, cycles = search.plant.data, range(search.plant.data.n_cycles)
+    left = residuals(search.plant, search.noise, model.fit.point, cycles, N_SEEDS)
+    if np.ptp(data.dT) > WARMER or _differ(search, left) < DIFFER:
         return None
     search.say("cycles of one motion differ: faults of each")
-    fits = [
-        fit(search.plant, search.noise, K_FREE, model.fit.point, [c], known=_known(model, c, search), n_iterations=5)
-        for c in cycles
-    ]
-    if search.noise.misfit([f.residuals[c] for f, c in zip(fits, cycles, strict=True)], cycles) > NEARLY:
-        return None
-    return np.array([[f.point[name] - model.fit.point[name] for name in FAULTS] for f in fits])
+    fits = [_of_one(search, model, c) for c in cycles]
+    left = {c: fitted.residuals[c] for c, fitted in zip(cycles, fits, strict=True)}
+    return _faults(search, fits) if _differ(search, left) < DIFFER else None
+
+
+def beside(search: Search, model: Model) -> Array:
+    """Faults of each cycle beside the effects of `model`, shape (n_cycles, 6)."""
+    return _faults(search, [_of_one(search, model, c) for c in range(search.plant.data.n_cycles)])
+
+
+def _of_one(search: Search, model: Model, cycle: int) -> Fit:
+    """Faults of one cycle, with the columns of its motion."""
+    motion = int(search.plant.data.motion[cycle])
+    known = {key: column for key, column in model.fit.columns.items() if key[0] == motion}
+    return fit(search.plant, search.noise, K_FREE, model.fit.point, [cycle], known=known, n_iterations=5)
+
+
+def _faults(search: Search, fits: Sequence[Fit]) -> Array:
+    found = np.array([[fitted.point.get(name, 0.0) for name in FAULTS] for fitted in fits])
+    return np.clip(search.plant.data.faults + found, 0.0, 1.0)
 
 
 def said(faults: Array) -> str:
@@ -48,21 +62,13 @@ def said(faults: Array) -> str:
     return f"faults change from cycle to cycle: {', '.join(ranges)}; what is told of them here is their mean"
 
 
-def _known(model: Model, cycle: int, search: Search) -> dict[tuple[int, str], Array]:
-    """Columns of `model` for the motion of a cycle."""
-    motion = int(search.plant.data.motion[cycle])
-    return {key: column for key, column in model.fit.columns.items() if key[0] == motion}
-
-
-def _differ(search: Search, point: Point) -> float:
+def _differ(search: Search, left: Mapping[int, Array]) -> float:
     """Squared differences between cycles of one motion, over what noise makes of them; one where none is repeated."""
-    data, noise = search.plant.data, search.noise
-    left = residuals(search.plant, noise, point, range(data.n_cycles), N_SEEDS)
     found = expected = 0.0
     for motion in range(search.plant.n_motions):
-        cycles: Sequence[int] = np.flatnonzero(data.motion == motion).tolist()
+        cycles: Sequence[int] = np.flatnonzero(search.plant.data.motion == motion).tolist()
         r = np.array([left[c] for c in cycles])
         found += float(((r - r.mean(axis=0)) ** 2).sum())
-        each = float((noise.motions[motion].fresh ** 2).sum(axis=1).mean()) * (1.0 + 1.0 / N_SEEDS)
+        each = float((search.noise.motions[motion].fresh ** 2).sum(axis=1).mean()) * (1.0 + 1.0 / N_SEEDS)
         expected += (len(cycles) - 1) * each
     return found / expected if expected else 1.0
