@@ -276,16 +276,17 @@ def _check_synchrony(where: str, s: Signals, plant: Actuator) -> None:
     I_ref = np.clip(
         c.K_w * (c.K_p * (s.theta_cmd[0] - s.theta_u[0]) - w_m), -plant.inverter.I_max, plant.inverter.I_max
     )
+    slow = ", or the current control is far slower than the plant file's"
     pairs = (
-        ("the currents", "position and command", tau, I_ref),
-        ("θ_u", "θ_m", s.theta_u[0], s.theta_m[0]),
+        ("the currents", "position and command", tau, I_ref, slow),
+        ("θ_u", "θ_m", s.theta_u[0], s.theta_m[0], ""),
     )
-    for late, early, x, y in pairs:
+    for late, early, x, y, or_else in pairs:
         lag, correlation = _lag(x, y, reach)
         if abs(lag) > MAX_LAG * rate:
             side = "after" if lag > 0 else "before"
             raise RecordError(
-                f"{where}: {late} come {abs(lag) / rate:.3g} s {side} {early}: channels are not synchronised"
+                f"{where}: {late} come {abs(lag) / rate:.3g} s {side} {early}: channels are not synchronised{or_else}"
             )
         if correlation < 0.5:
             raise RecordError(
