@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import click
 
-from ema.core.errors import ConfigError, RecordError
+from ema.core.errors import ConfigError, NoCycleError, RecordError
 from ema.core.records import Record
 
 # Which module examines which kind of plant.
@@ -27,6 +28,8 @@ EXAMINERS = {"ema": "ema.discrepancy.actuator", "axis": "ema.discrepancy.axis"}
 def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: str | None, as_json: bool) -> None:
     """Compare measured RECORDs with the simulation of the plant, and say what it gets wrong and why.
 
+    A RECORD is a CSV file, a log, or a directory of logs.
+
     Writes findings.json, report.html (opens offline) and extended.yaml: the plant with the effects that were found,
     which every other command accepts.
 
@@ -34,14 +37,13 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
     Examples:
       ema discrepancy --plant config/actuator.yaml flight.csv --out findings
       ema discrepancy --plant bench.yaml sine.csv rolling.csv --out findings --json
-      ema discrepancy --plant actuator.yaml log/*.mcap --cycles 17,18,20 --out findings
+      ema discrepancy --plant actuator.yaml log --cycles 17,18,20 --out findings
     """
     from importlib import import_module
 
     from rich.console import Console
 
     from ema.core import config
-    from ema.core.records import read_record
     from ema.discrepancy.extended import write_extended
     from ema.discrepancy.report import write_report
 
@@ -49,7 +51,8 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
     if kind not in EXAMINERS:
         raise ConfigError(f"{plant_file}: key 'kind' = {kind!r}: must be one of {', '.join(EXAMINERS)}")
     examiner = import_module(EXAMINERS[kind])
-    read = _chosen([read_record(path) for path in records], cycles)
+    read, empty = _read(records)
+    read = _chosen(read, cycles)
     findings_file, report, extended = (out / name for name in ("findings.json", "report.html", "extended.yaml"))
     for path in (findings_file, report, extended):
         if path.exists():
@@ -66,7 +69,7 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
             status.update(text)
 
         findings, draw = examiner.discrepancy(plant_file, read, say)
-        findings.notes.extend(_left_out(read, cycles))
+        findings.notes.extend([*_left_out(read, cycles), *empty])
         findings.write(findings_file)
         found = [*findings.effects, *findings.unnamed]
         write_extended(plant_file, found, extended, findings.fitted)
@@ -81,6 +84,23 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
         for note in findings.notes:
             click.echo(f"- {note}")
         click.echo(f"{report}")
+
+
+def _read(paths: Sequence[Path]) -> tuple[list[Record], list[str]]:
+    """The records, of directories every log in them, and what is said of logs without a whole cycle beside others."""
+    from ema.core.records import read_record
+    from ema.log.reader import find_logs
+
+    found: list[Record] = []
+    empty: list[NoCycleError] = []
+    for path in (p for given in paths for p in (find_logs(given, (".mcap",)) if given.is_dir() else [given])):
+        try:
+            found.append(read_record(path))
+        except NoCycleError as error:
+            empty.append(error)
+    if not found:
+        raise empty[0]
+    return found, [str(error) for error in empty]
 
 
 def _chosen(records: list[Record], numbers: str | None) -> list[Record]:

@@ -21,6 +21,10 @@ class RecordError(EmaError):
     """A record cannot be read, or lacks what the command needs: channel, unit, length, finite values."""
 
 
+class NoCycleError(RecordError):
+    """A log is sound, but no cycle in it is whole: it may end, or begin, in the middle of one."""
+
+
 class BundleError(EmaError):
     """A bundle is damaged, foreign, newer than this software, or made for another actuator."""
 

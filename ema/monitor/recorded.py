@@ -16,7 +16,7 @@ from ema.bus import codec as codecs
 from ema.bus import identifiers
 from ema.bus.codec import Codec
 from ema.core.config import validate
-from ema.core.errors import RecordError
+from ema.core.errors import NoCycleError, RecordError
 from ema.core.records import Cycle, Record
 from ema.log import LogReader
 from ema.models.actuator import Actuator
@@ -35,7 +35,9 @@ def read_mcap(path: Path) -> Record:
     Raises
     ------
     RecordError
-        The log holds several actuators (`ema export --what cycles` takes them apart), or no whole cycle.
+        The log holds several actuators (`ema export --what cycles` takes them apart).
+    NoCycleError
+        It holds no whole cycle.
     """
     with LogReader(path) as log:
         found: dict[int, list[Cycle]] = {}
@@ -48,7 +50,7 @@ def read_mcap(path: Path) -> Record:
                     f"{path}: holds actuators {numbers}; 'ema export {path} --what cycles --out DIR' takes them apart"
                 )
     if not found:
-        raise RecordError(f"{path}: no cycle without a gap in it")
+        raise NoCycleError(f"{path}: no cycle without a gap in it")
     return Record(tuple(next(iter(found.values()))), path, broken=tuple(broken))
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
-from ema_postflight.discrepancy import _chosen, _left_out
+from ema_postflight.discrepancy import _chosen, _left_out, _read
 
-from ema.core.errors import ConfigError, RecordError
+from ema.core.errors import ConfigError, LogError, NoCycleError, RecordError
 from ema.core.records import Cycle, Record
+from ema.log import LogSettings, LogWriter
 
 
 @pytest.fixture
@@ -39,3 +42,22 @@ def test_what_was_left_out_for_its_gaps_is_told(records):
         _chosen(records, "3,10")
     assert _left_out(records, None) == ["record: 1 of 3 cycles have gaps and were left out"]
     assert _left_out(_chosen(records, "3,9"), "3,9") == []
+
+
+def log(directory, flight, bundle):
+    """A finished segment with the frames of a flight."""
+    with LogWriter(directory, {"manifest.json": json.dumps(bundle.manifest).encode()}, LogSettings(keep_free=0)) as out:
+        for _, frames in flight:
+            out.frames(frames, "vcan0")
+
+
+def test_a_directory_stands_for_the_logs_in_it_and_one_without_a_cycle_is_left_out(fly, coarse_bundle, tmp_path):
+    with pytest.raises(LogError, match="holds no log"):
+        _read([tmp_path])
+    log(tmp_path, [], coarse_bundle)
+    with pytest.raises(NoCycleError, match="no cycle without a gap"):
+        _read([tmp_path])
+    log(tmp_path, fly(n_cycles=2, seed=4), coarse_bundle)
+    (record,), (told,) = _read([tmp_path])
+    assert record.n_cycles == 2
+    assert told.endswith("no cycle without a gap in it")
