@@ -51,6 +51,7 @@ DOUBTFUL = 2.0  # deviations from nothing, below which an effect is not named
 SLACK = 0.1  # misfit that switching noise may make
 ENVELOPE_SETTLING = 15e-3  # [s]
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
+N_EXCHANGED = 2  # likeliest others that are tried in place of an earlier effect where a rest is left
 N_BESIDE = 2  # turns in which faults of each cycle are found anew beside the effects
 NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none
 
@@ -254,6 +255,8 @@ def _gone(search: Search, begun: Path) -> Path:
     alike, as_well = list(begun.alike), list(begun.as_well)
     after, v = (begun.after, begun.verdict) if begun.after.effects else (before, verdict_before)
     after, v = _grown(search, before, after, v, alike)
+    if not v.is_noise:
+        after, v = _exchanged(search, after, v, alike)
     if not v.is_noise:  # the library had its chance
         other, w = _as_on_the_bench(search, after, v)
         if other is not after:
@@ -304,6 +307,24 @@ def _grown(
             after, v = _settled(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
+
+
+def _exchanged(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+    """`model`, or one with another effect in place of an earlier one, which was chosen before the others were there."""
+    for effect in model.effects[:-1]:
+        place = model.effects.index(effect)
+        there = [m for m in search.tried if m.effects and m.names[:-1] == model.names[:place]]
+        beside = [m for m in there if m.names[-1] not in model.names]
+        best = {m.names[-1]: m for m in sorted(beside, key=lambda m: -m.heldout)}
+        for rival in sorted(best.values(), key=lambda m: m.heldout)[:N_EXCHANGED]:
+            made = search.instead(model, effect, rival)
+            if made.excess < CLOSE * model.excess and _is_credible(made):
+                search.say(f"{rival.names[-1]} instead of {effect.effect}")
+                del alike[place]
+                alike.append(())
+                model, v = made, search.verdict(made)
+                break
+    return model, v
 
 
 def _is_enough(model: Model, before: Model) -> bool:
