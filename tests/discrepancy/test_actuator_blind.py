@@ -15,7 +15,7 @@ from ema.core.csv_records import write_csv
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.cycles import measured
-from ema.discrepancy.actuator.examine import examine, split
+from ema.discrepancy.actuator.examine import _exchanged, examine, split
 from ema.discrepancy.actuator.fit import K_FREE
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
@@ -220,6 +220,29 @@ def test_a_heavier_rotor_beside_drag_is_no_weaker_magnet_for_sure(hidden, shippe
     assert beside["inertia"].heldout < found.heldout
     assert beside["inertia"].fit.point["viscous_drag.coefficient"] == pytest.approx(7.37e-5, rel=0.02)
     assert beside["inertia"].fit.point["k1"] == pytest.approx(0.057, abs=3e-3)
+
+
+@pytest.mark.slow
+def test_what_was_chosen_first_is_exchanged_where_a_rest_is_left(hidden, shipped_plant):
+    """Without Stribeck's friction quadratic drag had done more than the viscous drag that is there; it had stayed."""
+    cycles = hidden.cycles(hidden.Flaws(viscous=7.7e-5, stribeck=0.48, stribeck_speed=19.7, k1=0.024, k3=0.037), 4, 30)
+    data = measured(shipped_plant, [Record(tuple(Cycle(number, c) for number, c in enumerate(cycles)))])
+    drag = {"quadratic_drag.coefficient": 3.2e-7}
+    law = {"stribeck.excess": 0.3, "stribeck.speed": 14.0, "stribeck.shape": 1.0}
+    start = {"k1": 0.085, "k3": 0.037, **drag, **law}
+    plant = EmaPlant(shipped_plant, data)
+    search = Search(plant, Noise(plant, start), *split(data))
+    quadratic, stribeck, viscous = (
+        next(c for c in candidates(shipped_plant, data, []) if c.effect == name)
+        for name in ("quadratic_drag", "stribeck", "viscous_drag")
+    )
+    search.model((viscous,), (*K_FREE, *viscous.frees), {"k1": 0.03, "viscous_drag.coefficient": 7e-5}, None, 1)
+    chosen = search.model((quadratic, stribeck), (*K_FREE, *quadratic.frees, *stribeck.frees), start, None, 2)
+    alike = [(), ()]
+    found, _ = _exchanged(search, chosen, search.verdict(chosen), alike)
+    assert found.names == ("stribeck", "viscous_drag")
+    assert alike == [(), ()]
+    assert found.fit.point["viscous_drag.coefficient"] == pytest.approx(7.7e-5, rel=0.02)
 
 
 @pytest.mark.slow
