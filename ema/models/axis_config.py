@@ -69,9 +69,7 @@ class Axis(Settings):
 
     @field_validator("effects")
     @classmethod
-    def _known_effects(
-        cls, effects: dict[str, dict[str, Annotated[float, BeforeValidator(plain)]]]
-    ) -> dict[str, dict[str, float]]:
+    def _known_effects(cls, effects: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
         for key, values in effects.items():
             name = key.split(INSTANCE)[0]
             if key != name and name != "cogging":

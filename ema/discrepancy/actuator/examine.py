@@ -192,9 +192,9 @@ def _gone_on(search: Search, path: Path) -> Path:
     """
     before = start_model(search, {name: search.noise.point[name] for name in FAULTS})
     after = search.model(path.after.effects, path.after.fit.free, search.noise.point, None, 4)
-    begun = Path.of(search, before)
-    begun = replace(begun, tried=path.tried, after=after, verdict=search.verdict(after))
-    return _gone(search, replace(begun, alike=path.alike, as_well=path.as_well))
+    v, known = search.verdict(after), Path.of(search, before)
+    begun = replace(known, tried=path.tried, after=after, verdict=v, alike=path.alike, as_well=path.as_well)
+    return _gone(search, begun)
 
 
 def _faults_only(search: Search, faults: Point) -> list[Path]:
@@ -289,7 +289,7 @@ def _grown(
         after, *rivals = [m for m in real if _is_alike(m, real[0])]
         # What runs differ by depends on the point, and so does every weight.
         noise = Noise(search.plant, after.fit.point)
-        while min(after.excess, search.excess_by(noise, after)) < NEW_NOISE * left:
+        while after.excess < NEW_NOISE * left or search.excess_by(noise, after) < NEW_NOISE * left:
             near = [m for m in real if m in (after, *rivals) or m.excess < max(NEARLY, NEARLY_ALL * left)]
             search.noise = noise
             near = [search.model(m.effects, m.fit.free, m.fit.point, m.fit.columns, 2) for m in near]

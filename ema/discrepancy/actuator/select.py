@@ -116,16 +116,18 @@ class Search:
         return self._judged(model.effects, fitted)
 
     def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:
-        left = residuals(self.plant, self.noise, fitted.point, self.heldout, N_FINAL, FINAL_SEED)
-        made = Model(tuple(effects), fitted, self.noise.misfit(list(left.values()), self.heldout))
+        made = Model(tuple(effects), fitted, self._misfit(self.noise, fitted.point, self.heldout))
         self.tried.append(made)
         self.say(f"{' + '.join(made.names) or 'faults only'}: held-out misfit {made.heldout:.3g}")
         return made
 
     def excess_by(self, noise: Noise, model: Model) -> float:
         """What `model` leaves on held-out cycles beyond another noise."""
-        left = residuals(self.plant, noise, model.fit.point, self.heldout, N_FINAL, FINAL_SEED)
-        return max(noise.misfit(list(left.values()), self.heldout) - 1.0, 0.0)
+        return max(self._misfit(noise, model.fit.point, self.heldout) - 1.0, 0.0)
+
+    def _misfit(self, noise: Noise, point: Point, cycles: Sequence[int]) -> float:
+        left = residuals(self.plant, noise, point, cycles, N_FINAL, FINAL_SEED)
+        return noise.misfit(list(left.values()), cycles)
 
     def verdict(self, model: Model) -> Verdict:
         """Is what `model` leaves on all cycles noise?"""
@@ -213,8 +215,8 @@ class Search:
         """How much misfit comes back, held-out or in training, when an effect is switched off and all else stays."""
         neutral = {f.name: self.plant.neutral(f.name) for f in effect.frees}
         cycles = self.train if in_training else self.heldout
-        left = residuals(self.plant, self.noise, {**model.fit.point, **neutral}, cycles, N_FINAL, FINAL_SEED)
-        return self.noise.misfit(list(left.values()), cycles) - (model.fit.misfit if in_training else model.heldout)
+        without = self._misfit(self.noise, {**model.fit.point, **neutral}, cycles)
+        return without - (model.fit.misfit if in_training else model.heldout)
 
     def _columns(self, c: Candidate) -> Array:
         names = [Free(c.probe_name(j), 0.0, 0.0, 1.0) for j in range(len(c.amounts))]
