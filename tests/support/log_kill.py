@@ -17,18 +17,47 @@ from ema.log.recovery import is_sound, recover
 
 INTERVAL = 0.5
 AT_ONCE = 10
+STEP = 0.004  # [s] between two events
+
+
+class Told:
+    """Numbers in a file that outlives the process, whatever the log does: last event, sync under way, longest stall."""
+
+    LAST, SYNC, STALL = 0, 8, 16
+
+    def __init__(self, path):
+        self._file = os.open(path, os.O_CREAT | os.O_RDWR)
+
+    def write(self, place, ns):
+        os.pwrite(self._file, ns.to_bytes(8, "little"), place)
+
+    def read(self, place):
+        return int.from_bytes(os.pread(self._file, 8, place), "little")
+
+    def stalled(self, ns):
+        self.write(self.STALL, max(ns, self.read(self.STALL)))
 
 
 def child(directory):
+    told, sync = Told(directory / "last"), os.fdatasync
+
+    def timed(descriptor):
+        begun = time.monotonic_ns()
+        told.write(told.SYNC, begun)
+        sync(descriptor)
+        told.write(told.SYNC, 0)
+        told.stalled(time.monotonic_ns() - begun)
+
+    os.fdatasync = timed  # a process of its own
     log = LogWriter(directory, {"ema.dbc": b"x" * 1000}, LogSettings(flush_interval=INTERVAL, segment_time=0.8))
-    told = os.open(directory / "last", os.O_CREAT | os.O_WRONLY)  # outlives the process, whatever the log does
     n = 0
     while True:
         t_ns = time.monotonic_ns()
         log.event({"t_ns": t_ns, "level": "info", "code": "n", "text": str(n), "actuator": None})
-        os.pwrite(told, t_ns.to_bytes(8, "little"), 0)
+        told.write(told.LAST, t_ns)
         n += 1
-        time.sleep(0.004)
+        time.sleep(STEP)
+        told.stalled(time.monotonic_ns() - t_ns - int(1e9 * STEP))
 
 
 def survivors(directory):
@@ -47,7 +76,7 @@ def survivors(directory):
 
 def main(directory, trials, seed):
     rng = np.random.default_rng(seed)
-    missing, segments = [], 0
+    missing, stalled, segments = [], [], 0
     for batch in range(0, trials, AT_ONCE):
         running = []
         for trial in range(batch, min(batch + AT_ONCE, trials)):
@@ -60,12 +89,15 @@ def main(directory, trials, seed):
         for pid, place, moment in sorted(running, key=lambda run: run[2]):
             time.sleep(max(0.0, moment - time.monotonic()))
             os.kill(pid, signal.SIGKILL)
+            killed_ns = time.monotonic_ns()
             os.waitpid(pid, 0)
             segments += len(list(place.glob("*.mcap")))
-            logged_ns = int.from_bytes((place / "last").read_bytes(), "little")
-            last_ns = survivors(place)
-            missing.append((logged_ns - last_ns) / 1e9 if last_ns is not None else float("inf"))
-    print(json.dumps({"trials": len(missing), "interval": INTERVAL, "segments": segments, "missing": missing}))
+            told, last_ns = Told(place / "last"), survivors(place)
+            missing.append((told.read(told.LAST) - last_ns) / 1e9 if last_ns is not None else float("inf"))
+            under_way = killed_ns - (told.read(told.SYNC) or killed_ns)
+            stalled.append(max(under_way, told.read(told.STALL)) / 1e9)
+    result = {"trials": len(missing), "interval": INTERVAL, "segments": segments, "missing": missing}
+    print(json.dumps({**result, "stalled": stalled}))
 
 
 if __name__ == "__main__":

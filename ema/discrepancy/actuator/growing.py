@@ -3,48 +3,101 @@
 Cycles of one motion differ by chance alone if nothing changes between them; no effect of the library makes them differ,
 but for those of temperature. Where they differ by more, and with faults of each cycle they do not, these are no flaw.
 What all cycles leave alike is looked into beside them; faults of each have taken what they could of it, so they are
-found anew beside every effect.
+found anew beside every effect. Where the temperature changes too, shorts that grow alike in all phases as the winding
+warms are left to a magnet that does so; what else grows is none of the temperature's.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ema.core.names import FAULTS
+from ema.effects import registry
 
 from .candidates import WARMER
 from .features import Array
-from .fit import K_FREE, N_SEEDS, Fit, fit, residuals
+from .fit import K_FREE, N_SEEDS, Columns, Fit, Free, fit, free, residuals
+from .plant import Point
 from .select import Model, Search
 
 DIFFER = 1.5  # times what noise makes of the differences between cycles of one motion
 TOLD = 0.01  # range of a fault from which it is said to change
+SURELY = 3.0  # deviations from nothing of what is said to go with the temperature
+FLUX, FLUX_STEP = "magnet_flux", 0.03
+CHANGE, PER_KELVIN = f"{FLUX}.change", f"{FLUX}.per_kelvin"
 
 
 def growing(search: Search, model: Model) -> Array | None:
     """Faults of each cycle, shape (n_cycles, 6), if these explain what cycles of one motion differ by."""
-    data, cycles = search.plant.data, range(search.plant.data.n_cycles)
+    cycles = range(search.plant.data.n_cycles)
     left = residuals(search.plant, search.noise, model.fit.point, cycles, N_SEEDS)
-    if np.ptp(data.dT) > WARMER or _differ(search, left) < DIFFER:
+    if _differ(search, left) < DIFFER:
         return None
     search.say("cycles of one motion differ: faults of each")
-    fits = [_of_one(search, model, c) for c in cycles]
+    fits = _each(search, model.fit)
     left = {c: fitted.residuals[c] for c, fitted in zip(cycles, fits, strict=True)}
-    return _faults(search, fits) if _differ(search, left) < DIFFER else None
+    faults = _faults(search, fits)
+    if _differ(search, left) >= DIFFER or (_is_warming(search) and np.ptp(faults, axis=0).max() < TOLD):
+        return None
+    return faults
 
 
 def beside(search: Search, model: Model) -> Array:
     """Faults of each cycle beside the effects of `model`, shape (n_cycles, 6)."""
-    return _faults(search, [_of_one(search, model, c) for c in range(search.plant.data.n_cycles)])
+    return _faults(search, _each(search, model.fit))
 
 
-def _of_one(search: Search, model: Model, cycle: int) -> Fit:
+def _is_warming(search: Search) -> bool:
+    return bool(np.ptp(search.plant.data.dT) > WARMER)
+
+
+def _each(search: Search, of_all: Fit) -> list[Fit]:
+    """Faults of each cycle; where it becomes warmer, beside a magnet that goes with that."""
+    fits = [_of_one(search, of_all, c) for c in range(search.plant.data.n_cycles)]
+    more = _flux_per_kelvin(search, of_all, fits) if _is_warming(search) else 0.0
+    if not more:
+        return fits
+    per_kelvin = of_all.point.get(PER_KELVIN, 0.0) + more
+    search.say(f"beside a magnet that changes by {per_kelvin:.2%} per kelvin: faults of each anew")
+    warmer = replace(of_all, point={**of_all.point, PER_KELVIN: per_kelvin})
+    return [_of_one(search, warmer, c) for c in range(search.plant.data.n_cycles)]
+
+
+def _of_one(search: Search, of_all: Fit, cycle: int) -> Fit:
     """Faults of one cycle, with the columns of its motion."""
     motion = int(search.plant.data.motion[cycle])
-    known = {key: column for key, column in model.fit.columns.items() if key[0] == motion}
-    return fit(search.plant, search.noise, K_FREE, model.fit.point, [cycle], known=known, n_iterations=5)
+    known = {key: column for key, column in of_all.columns.items() if key[0] == motion}
+    return _one(search, K_FREE, of_all.point, cycle, known)
+
+
+def _one(search: Search, frees: Sequence[Free], start: Point, cycle: int, known: Columns | None = None) -> Fit:
+    return fit(search.plant, search.noise, frees, start, [cycle], known=known, n_iterations=5)
+
+
+def _flux_per_kelvin(search: Search, of_all: Fit, fits: Sequence[Fit]) -> float:
+    """By how much a magnet changes per kelvin in place of what the shorts of each cycle have in common; zero if unsure.
+
+    One cycle does not tell a weaker magnet from shorts of all phases, so the phase with the least has none here.
+    """
+    shorts = [name for name in registry()[FLUX].mistaken_for if name in FAULTS]
+    k = np.array([[fitted.point[name] for name in shorts] for fitted in fits])
+    least = shorts[int(np.argmin(k.mean(axis=0)))]
+    frees = [*(f for f in K_FREE if f.name != least), free(CHANGE, FLUX_STEP)]
+    change, sd = np.empty(len(fits)), np.empty(len(fits))
+    for c, (fitted, own) in enumerate(zip(fits, k, strict=True)):
+        others = dict(zip(shorts, (own - own.min()).tolist(), strict=True))
+        flux = of_all.point.get(CHANGE, 0.0) - float(own.min())
+        instead = _one(search, frees, {**fitted.point, **others, least: 0.0, CHANGE: flux}, c)
+        change[c], sd[c] = instead.point[CHANGE], instead.sd[CHANGE]
+    dT = search.plant.data.dT
+    line, covariance = np.polyfit(dT, change, 1, w=1.0 / sd, cov="unscaled")
+    scatter = float((((change - np.polyval(line, dT)) / sd) ** 2).sum()) / max(len(fits) - 2, 1)
+    slope, slope_sd = float(line[0]), float(np.sqrt(max(scatter, 1.0) * covariance[0, 0]))
+    needed = max(SURELY * slope_sd, 0.0 if PER_KELVIN in of_all.point else TOLD / np.ptp(dT))
+    return slope if len(fits) > 2 and abs(slope) > needed else 0.0
 
 
 def _faults(search: Search, fits: Sequence[Fit]) -> Array:
