@@ -71,6 +71,15 @@ def test_the_supply_is_its_voltage_without_load(cycles, shipped_plant):
     assert "47 V in the records, 48 V in the plant file" in notes[0]
 
 
+def test_commands_that_differ_by_less_than_a_sensors_step_are_two_motions_unless_it_is_noise(hidden, shipped_plant):
+    """Ten microradians of command, smooth, left ten times the noise when they were simulated as one motion."""
+    (channels,) = hidden.cycles(hidden.Flaws(), 1, 3, (hidden.sine(2e-3, 8.0, 0.5),))
+    command, rng = channels["theta_cmd"], np.random.default_rng(5)
+    others = (1.005 * command, command + 2e-6 * rng.standard_normal(len(command)), command)
+    recorded = [channels, *({**channels, "theta_cmd": other} for other in others)]
+    assert prepared(shipped_plant, recorded).motion.tolist() == [0, 1, 0, 0]
+
+
 def test_an_angle_within_one_turn_is_the_same_angle(cycles, shipped_plant):
     whole = prepared(shipped_plant, cycles)
     wrapped = prepared(shipped_plant, cycles, theta_m=lambda x: x % (2.0 * np.pi))

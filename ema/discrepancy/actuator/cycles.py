@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from ema.core.errors import RecordError
 from ema.core.names import FAULTS
@@ -31,6 +32,7 @@ MEDIAN_OF_NORMAL = 0.6745  # of |x| where x is standard normal
 AT_REST = 1e-3  # [s] at the start of a cycle, over which the position is averaged
 CLEAR = 4.0  # standard deviations
 STARTING = (10e-3, 7e-3, 5e-3, 3.5e-3, 2.5e-3)  # [s] at the start of a cycle
+SAME_COMMAND, LOCAL = 1e-6, 5e-3  # [rad] by which commands of one motion may differ in the mean over [s]
 AS_NOISE = 1.15  # times the noise that a curve through it may leave
 
 
@@ -119,7 +121,8 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
             _check_clipping(where, s, plant)
             _check_synchrony(where, s, plant)
             command = cycle["theta_cmd"]
-            motion.append(_motion(commands, command, plant))
+            resolution = _step(command[:: positions_every(s.theta_m[0])])
+            motion.append(_motion(commands, command, resolution, plant))
             labels.append(where)
             everything.append((s, cycle))
     signals = [s for s, _ in everything]
@@ -164,10 +167,13 @@ def _signals(cycle: Cycle, with_supply: bool, GR: float) -> Signals:
     )
 
 
-def _motion(commands: list[Array], command: Array, plant: Actuator) -> int:
-    """Index of the motion with this command (to the resolution of the position sensor); appended if new."""
+def _motion(commands: list[Array], command: Array, resolution: float, plant: Actuator) -> int:
+    """Index of the motion with this command, but for noise or the resolution it is recorded with; appended if new."""
+    width = max(1, round(LOCAL * plant.control.rate))
     for index, known in enumerate(commands):
-        if len(known) == len(command) and np.abs(known - command).max() <= plant.sensors.lvdt_step:
+        if len(known) != len(command) or np.abs(known - command).max() > plant.sensors.lvdt_step:
+            continue
+        if np.abs(uniform_filter1d(known - command, width)).max() <= max(resolution, SAME_COMMAND):
             return index
     commands.append(command)
     return len(commands) - 1
