@@ -22,6 +22,7 @@ MODES = {
     "force": kernel.FORCE,
     "speed-loop": kernel.SPEED_LOOP,
 }
+BETWEEN = {"straight": kernel.STRAIGHT, "held": kernel.HELD, "held before": kernel.HELD_BEFORE}
 Effects = Mapping[str, Mapping[str, float]]
 
 
@@ -87,6 +88,7 @@ def simulate(
     h_max: float,
     dT: Array | None = None,
     slide: Array | None = None,
+    between: str = "straight",
 ) -> Array:
     """Outputs (4, n_times) of all windows: position, speed, current, voltage as the sensors show them.
 
@@ -103,13 +105,14 @@ def simulate(
         Winding temperature less 20 °C. [K]
     slide : array, shape (n_windows,), optional
         ±1 where the axis slides that way throughout the window, 0 where it may rest or turn round.
+    between : str
+        What the drive does from one sample to the next: runs straight, is held, or is that of the next (held before).
     """
     slide = np.zeros(len(starts)) if slide is None else slide
     dT = np.zeros(len(starts)) if dT is None else dT
     out = np.empty((len(kernel.OUTPUTS), len(t)))
-    kernel.simulate_windows(
-        numbers.z, numbers.lines, numbers.terms, MODES[drive], offsets, t, recorded, starts, slide, dT, h_max, out
-    )
+    model = (numbers.z, numbers.lines, numbers.terms, MODES[drive], BETWEEN[between])
+    kernel.simulate_windows(*model, offsets, t, recorded, starts, slide, dT, h_max, out)
     return out
 
 

@@ -25,6 +25,7 @@ from .axis_layout import row
 from .hooks import combined
 
 CURRENT, VOLTAGE, FORCE, SPEED_LOOP = range(4)
+STRAIGHT, HELD, HELD_BEFORE = range(3)  # what a recorded drive does from one sample to the next
 CREEP = 1e-9  # [rad/s] at least, where the axis is known to slide
 OUTPUTS = ("theta_m", "w_m", "i_q", "u_q")
 
@@ -143,7 +144,7 @@ def loads_after(z, offsets, t, theta, follows, h_max, out):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def simulate_window(z, lines, terms, mode, t, drive, start, slide, h_max, out):
+def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_max, out):
     """Simulate one window.
 
     Parameters
@@ -155,8 +156,11 @@ def simulate_window(z, lines, terms, mode, t, drive, start, slide, h_max, out):
     terms : array, shape (n_terms, len(torque_term.COLUMNS))
     mode : int
         CURRENT, VOLTAGE, FORCE or SPEED_LOOP: what `drive` is (current, voltage, force, commanded speed).
+    between : int
+        STRAIGHT, HELD or HELD_BEFORE: from sample to sample the drive runs straight, holds the value of the first, or
+        that of the second (a commanded speed is always held).
     t, drive : arrays, shape (n_times,)
-        Sample times and the recorded drive; between samples it runs straight (a commanded speed is held).
+        Sample times and the recorded drive.
     start : array, shape (4,)
         Position, speed, and by how much the load behind a gear that gives is behind in both.
     slide : float
@@ -200,7 +204,8 @@ def simulate_window(z, lines, terms, mode, t, drive, start, slide, h_max, out):
             if mode == SPEED_LOOP:
                 i = i_here
             else:
-                u = (drive[k] + x * (drive[k + 1] - drive[k]) - z[OFFSET]) * gain
+                share = x if between == STRAIGHT else 0.0 if between == HELD else 1.0
+                u = (drive[k] + share * (drive[k + 1] - drive[k]) - z[OFFSET]) * gain
                 if mode == VOLTAGE:
                     k_e = z[K_E] * emf_factor(z, 0, 1, i, z[DT])
                     L_now = max(z[L] * inductance_factor(z, 0, 1, i), 1e-12)
@@ -262,12 +267,13 @@ def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def simulate_windows(z, lines, terms, mode, offsets, t, drive, starts, slide, dT, h_max, out):
+def simulate_windows(z, lines, terms, mode, between, offsets, t, drive, starts, slide, dT, h_max, out):
     """Simulate windows `offsets[j]:offsets[j + 1]` of the concatenated arrays, each from its own start."""
     for j in range(offsets.shape[0] - 1):
         a, b = offsets[j], offsets[j + 1]
         z[DT] = dT[j]
-        simulate_window(z, lines, terms, mode, t[a:b], drive[a:b], starts[j], slide[j], h_max, out[:, a:b])
+        window = (t[a:b], drive[a:b], starts[j], slide[j])
+        simulate_window(z, lines, terms, mode, between, *window, h_max, out[:, a:b])
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)

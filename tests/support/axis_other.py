@@ -48,6 +48,7 @@ class Setup:
         default_factory=lambda: {"position": 2e-4, "speed": 0.05, "drive": 5e-3, "u": 0.02, "i": 5e-3}
     )
     speed: str = "measured"  # or none, or difference (of counts, through a filter)
+    held: bool = False  # the drive jumps at each sample and is held until the next, instead of running straight
     ripple: float = 0.0  # of the sampled current, relative to its size, at a frequency beside that of sampling
     hidden: tuple[float, ...] = (0.0,) * 8  # see `_hidden`
     channels: tuple[str, ...] = ()  # optional ones to keep; all if empty
@@ -88,7 +89,7 @@ def _rates(x, v, z, i, u, mode, p, hid, out):
 
 
 @njit(cache=False)
-def _run(n, ratio, h, mode, p, hid, amplitude, frequency, constant, phase, K, limit, x0, out):
+def _run(n, ratio, h, mode, p, hid, amplitude, frequency, constant, phase, K, limit, held, x0, out):
     s = np.array([x0, 0.0, 0.0, 0.0])
     k1, k2, k3, k4 = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4)
     u, slope, x_ref = 0.0, 0.0, x0
@@ -100,6 +101,8 @@ def _run(n, ratio, h, mode, p, hid, amplitude, frequency, constant, phase, K, li
             new = min(max(K[0] * (x_ref - s[0]) + K[1] * (w_ref - s[1]), -limit), limit)
             if mode == 1:
                 new += p[5] * w_ref
+            if held:
+                u = new
             slope = (new - u) / (h * ratio)
             out[0, k // ratio], out[1, k // ratio], out[2, k // ratio], out[3, k // ratio] = s[0], s[1], u, s[3]
         if mode == 0:
@@ -137,7 +140,7 @@ def record(setup: Setup, seed: int) -> Record:
         out = np.empty((4, n))
         start = rng.uniform(0, 2 * np.pi) if setup.motion == "rotary" else 0.0
         motion = (amplitude, frequency, constant, rng.uniform(0, 2.0 * np.pi))
-        _run(n, ratio, h, mode, p, hidden, *motion, np.array(setup.gains), 1e9, start, out)
+        _run(n, ratio, h, mode, p, hidden, *motion, np.array(setup.gains), 1e9, setup.held, start, out)
         x, w, u, i = out
         t = np.arange(n) * setup.period
         noise = {name: rms * rng.standard_normal(n) for name, rms in {**QUIET, **setup.noise}.items()}

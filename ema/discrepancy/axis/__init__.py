@@ -12,6 +12,7 @@
 `gear`          the scan for a resonance of a gear that gives
 `zeros`         angle zeros of records given together
 `stretch`       the search for a stretch of other friction
+`between`       what the drive does between samples
 `structure`     terms suggested by the torque residual when no effect explains it
 `plant`         all of it as the engine's `Plant`
 ==============  =====================================================================================
@@ -31,13 +32,13 @@ def discrepancy(
     plant_file: Path, records: Sequence[Record], say: Callable[[str], None]
 ) -> tuple[Findings, Callable[[], list[Picture]]]:
     """Findings on records of the axis in `plant_file`, and what draws their pictures."""
-    from ema.discrepancy.examine import examine
     from ema.models import axis_config
 
+    from .between import examined
     from .pictures import pictures
     from .plant import AxisPlant
     from .wording import findings
 
     plant = AxisPlant(axis_config.load(plant_file), records)
-    outcome = examine(plant, say)
+    outcome = examined(plant, say)
     return findings(plant, outcome), lambda: pictures(plant, outcome)

@@ -53,8 +53,24 @@ def effects(plant: AxisPlant, found: Sequence[Candidate], point: Point, drawn: S
                 "mistaken_for": list(effect.mistaken_for),
                 "parameters": parameters,
             }
-            out.append(entry | (_electrical(plant, values) if effect.name == "cogging" else {}))
+            out.append(entry | (_line(plant, values) if effect.name == "cogging" else {}))
     return out
+
+
+def _line(plant: AxisPlant, values: dict[str, float]) -> dict[str, Any]:
+    """What else makes a torque line of this order."""
+    return _unbalance(values) if round(values["order"]) == 1 else _electrical(plant, values)
+
+
+def _unbalance(values: dict[str, float]) -> dict[str, Any]:
+    """Once per turn no motor cogs that is whole: what hangs on the shaft has weight, or the rotor runs out."""
+    return {
+        "also": ["unbalance"],
+        "n_equal": 1,
+        "sentence": f"torque of {values['amplitude']:.3g} N m once per turn: the weight of an unbalanced load, "
+        "or a rotor that is off centre",
+        "separated_by": "the same motion with the shaft upright, or with the load taken off",
+    }
 
 
 def _electrical(plant: AxisPlant, values: dict[str, float]) -> dict[str, Any]:

@@ -40,10 +40,16 @@ class AxisPlant:
     records : sequence of Record
     n_threads : int, optional
         Threads for batches of points; the result does not depend on it.
+
+    Attributes
+    ----------
+    between : str
+        What the recorded drive does between samples, a key of `ema.models.axis.BETWEEN`.
     """
 
     def __init__(self, plant: Axis, records: Sequence[Record], n_threads: int | None = None):
         self.plant = plant
+        self.between = "straight"
         names = _distinct([r.source.stem if r.source else f"record {k + 1}" for k, r in enumerate(records)])
         self.n_threads = n_threads or min(os.cpu_count() or 1, 8)
         length = plant.window or LONGEST_WINDOW
@@ -153,7 +159,8 @@ class AxisPlant:
         starts = self._starts(pack, model, step)
         starts[:, 0] += zero
         drive = pack.bench.roles.kind
-        out = axis.simulate(model, drive, pack.offsets, pack.t, pack.drive, starts, step, pack.dT, pack.slide)
+        record = (pack.offsets, pack.t, pack.drive, starts)
+        out = axis.simulate(model, drive, *record, step, pack.dT, pack.slide, self.between)
         out[0] -= zero
         return out[[_KERNEL_ROW[name] for name in pack.bench.roles.outputs]]
 
