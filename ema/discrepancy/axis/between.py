@@ -69,7 +69,7 @@ def _of_plain(plant: AxisPlant) -> str:
 
 
 def _beside(plant: AxisPlant, outcome: Outcome) -> str:
-    """The way that leaves much less beside the effects found, or held where both sensors are late by half a sample."""
+    """The way that leaves less though nothing was fitted for it, or held where all sensors are half a sample late."""
     blocks = range(len(plant.blocks))
     period = float(np.median([w.period for w in plant.windows if not w.static]))
     here = plant.between
@@ -83,7 +83,7 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     excess = {way: left(way) for way in LATE}
     plant.between = here
     best = min(excess, key=lambda way: excess[way])
-    if excess[best] < MUCH * excess[here] - NO_MORE:
+    if excess[best] < excess[here] - NO_MORE:
         return best
     seen = {name for b in plant.benches for name in b.roles.outputs}
     late = np.array([outcome.point.get(name, 0.0) for name, of in DELAYS.items() if seen & of]) / period
