@@ -47,6 +47,7 @@ SAME = 0.05  # difference in held-out misfit up to which fewer causes are prefer
 UNLIKELY = 0.1  # odds of an effect, against what is no credible cause too, below which it is not named
 NEARLY = 0.5  # excess of a model that may be the right one but for switching
 NEAR, N_OWN = 1.0, 3  # excess up to which so many models are weighed by noise of their own
+UNCERTAIN_LAW = 0.85  # of a confidence where a rest is left that nothing explains: it may be another law altogether
 DOUBTFUL = 2.0  # deviations from nothing, below which an effect is not named
 SLACK = 0.1  # misfit that switching noise may make
 ENVELOPE_SETTLING = 15e-3  # [s]
@@ -472,6 +473,9 @@ def _simpler(
         return model, v
     least, m, w, search.noise = min(as_good, key=lambda found: found[0])
     rivals = dict.fromkeys(n.names[-1] for more, n, *_ in as_good if more - least < ALIKE * m.excess + CHANCE)
+    for n in search.alike(model, m, set(rivals)):
+        if search.left_more(n, m, (search.noise,)) < ALIKE * m.excess + CHANCE and _is_credible(n):
+            rivals[n.names[-1]] = None
     alike.append((_in_common(m, m.effects[-1]), *(name for name in rivals if name != m.names[-1])))
     search.say(f"{m.names[-1]} instead of {alike[-1][0]}: p = {w.p_value:.2g}")
     return m, w
@@ -610,6 +614,8 @@ def _findings(search: Search, before: Model, after: Model, v: Verdict, alike: li
     rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
     found = [_found(search, after, c.effect, a, rest) for c, a in kept]
     found = [_whatever_the_cause(search, after, e, kept) for e in found]
+    if verdict == "unexplained":
+        found = [replace(e, confidence=UNCERTAIN_LAW * e.confidence) for e in found]
     if too_little and found:
         notes.append(
             f"{', '.join(e.name for e in found)} would explain {share:.0%} of the rest: too little to be named"

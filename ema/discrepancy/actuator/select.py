@@ -309,6 +309,15 @@ class Search:
                     break
         return sorted(found, key=lambda m: m.heldout)
 
+    def alike(self, model: Model, best: Model, known: set[str]) -> list[Model]:
+        """What can do nearly all that the last effect of `best` does in place of faults of `model`, fitted like it."""
+        effects, frees, rest = _stripped(best, best.effects[-1])
+        gone = {f.name: 0.0 for f in model.fit.free if f.name not in {g.name for g in frees}}
+        return [
+            self.model((*effects, s.candidate), (*frees, *s.candidate.frees), {**rest, **s.start, **gone}, None, 5)
+            for s in self._looking_like(model, best, self.promising(model), known)
+        ]
+
     def without_common_faults(self, model: Model, c: Candidate) -> Model | None:
         """`model` without what the faults that one of its effects can be mistaken for have in common, if they do."""
         common, gone = _common(model, c)
