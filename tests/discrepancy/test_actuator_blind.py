@@ -15,8 +15,9 @@ from ema.core.csv_records import write_csv
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.cycles import measured
-from ema.discrepancy.actuator.examine import _exchanged, examine, split
+from ema.discrepancy.actuator.examine import examine, split
 from ema.discrepancy.actuator.fit import K_FREE
+from ema.discrepancy.actuator.forward import exchanged
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.select import Search
@@ -239,7 +240,7 @@ def test_what_was_chosen_first_is_exchanged_where_a_rest_is_left(hidden, shipped
     search.model((viscous,), (*K_FREE, *viscous.frees), {"k1": 0.03, "viscous_drag.coefficient": 7e-5}, None, 1)
     chosen = search.model((quadratic, stribeck), (*K_FREE, *quadratic.frees, *stribeck.frees), start, None, 2)
     alike = [(), ()]
-    found, _ = _exchanged(search, chosen, search.verdict(chosen), alike)
+    found, _ = exchanged(search, chosen, search.verdict(chosen), alike)
     assert found.names == ("stribeck", "viscous_drag")
     assert alike == [(), ()]
     assert found.fit.point["viscous_drag.coefficient"] == pytest.approx(7.7e-5, rel=0.02)

@@ -10,10 +10,11 @@ from matplotlib.ticker import MaxNLocator
 
 from ema.discrepancy.report import Picture, picture
 
-from .examine import Examination, settled
+from .examine import Examination
 from .features import GROUPS, SECTORS, Array
 from .plant import ENVELOPE_STEP, Point
 from .select import FINAL_SEED, N_FINAL
+from .telling import settled
 from .weak import ORDERS, Torque, line, share_explained, torque
 
 BEFORE, AFTER, NOISE = "#c0392b", "#1f6fb2", "#b9bec6"

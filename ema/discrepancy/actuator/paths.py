@@ -1,0 +1,141 @@
+"""Ways through the search: from which noise, with which faults, to what end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ema.core.names import FAULTS
+
+from .comparators import PLAIN, take_step
+from .features import Array
+from .forward import CLOSE, exchanged, grown
+from .noise import Noise, Verdict
+from .plant import EmaPlant, Point
+from .select import CHANCE, Model, Search, start_model
+from .simpler import simpler
+from .telling import FAULT_ALARM
+from .timing import samples_late
+from .verdicts import NEARLY, as_on_the_bench, surely
+from .weighing import DISTANT
+
+
+@dataclass(frozen=True)
+class Path:
+    """One way through the search: with what noise, step of the comparators and command, from where to where.
+
+    `alike` holds, for each effect of `after`, what does as well in its place, `as_well` the effects that would explain
+    as well what several of its faults have in common.
+    """
+
+    noise: Noise
+    step: float | None
+    late: int
+    tried: list[Model]
+    before: Model
+    verdict_before: Verdict
+    after: Model
+    verdict: Verdict
+    alike: list[tuple[str, ...]]
+    as_well: list[str]
+
+    @classmethod
+    def of(cls, search: Search, model: Model) -> Path:
+        """The beginning, where nothing is explained yet."""
+        v = search.verdict(model)
+        plant = search.plant
+        return cls(search.noise, plant.step, plant.late, list(search.tried), model, v, model, v, [], [])
+
+
+def with_faults(search: Search, of_each: Array, point: Point) -> Search:
+    """A search from the beginning with faults of each cycle, shape (n_cycles, 6), and noise as at their mean."""
+    mean = of_each.mean(axis=0)
+    old = search.plant
+    plant = EmaPlant(old.plant, replace(old.data, faults=of_each - mean), old.n_threads)
+    plant.late = old.late
+    take_step(plant, old.step)
+    noise = Noise(plant, {**point, **dict(zip(FAULTS, mean.tolist(), strict=True))})
+    return Search(plant, noise, search.train, search.heldout, search.say)
+
+
+def gone_on(search: Search, path: Path) -> Path:
+    """A path to its end from the effects that were found, after the cycles' faults were found anew beside them.
+
+    Odds stay those of what was tried beside the same faults.
+    """
+    before = start_model(search, {name: search.noise.point[name] for name in FAULTS})
+    after = search.model(path.after.effects, path.after.fit.free, search.noise.point, None, 4)
+    v, known = search.verdict(after), Path.of(search, before)
+    begun = replace(known, tried=path.tried, after=after, verdict=v, alike=path.alike, as_well=path.as_well)
+    return _gone(search, begun)
+
+
+def faults_only(search: Search, faults: Point) -> list[Path]:
+    """Paths that begin with faults alone, from where these are expected.
+
+    What faults make of the noise weighs what tells them; both are found in turn.
+
+    Where that leads nowhere near the data, the faults found stand for something else. Then the noise may be what it is
+    without faults, or what they make of it: friction or drag, whatever their cause, change it hundredfold.
+    """
+    model = start_model(search, faults)
+    late = samples_late(search.plant, search.noise, model.fit.point, search.train) if model.excess > NEARLY else 0
+    if late:
+        search.plant.late = late
+        model = start_model(search, faults)
+    nominal = Path.of(search, model)
+    if nominal.verdict.is_noise and max(model.fit.point.get(name, 0.0) for name in FAULTS) < FAULT_ALARM:
+        return [nominal]
+    while True:
+        left = model.excess
+        search.noise = Noise(search.plant, model.fit.point)
+        model = search.model((), model.fit.free, model.fit.point, model.fit.columns, 1)
+        own = Path.of(search, model)
+        if own.verdict.is_noise or model.excess < NEARLY:
+            return [own]
+        if model.excess > CLOSE * left:
+            return [own] if model.excess < DISTANT else [nominal, own]
+        model = search.model((), model.fit.free, model.fit.point, None, 6)
+
+
+def shortest(search: Search, paths: list[Path]) -> Path:
+    """The first path that leaves next to nothing, or else the one that leaves least by the noise of both."""
+    best = _gone(search, paths[0])
+    for path in paths[1:]:
+        if best.verdict.is_noise or best.after.excess < CHANCE:
+            break
+        search.say("again, with the noise that faults alone make")
+        other = _gone(search, path)
+        if search.left_more(other.after, best.after, (other.noise, best.noise)) < 0.0:
+            best = other
+    return best
+
+
+def resume(search: Search, path: Path) -> None:
+    """Noise, tried models and conditions of the bench as they are on a path."""
+    search.noise, search.tried = path.noise, list(path.tried)
+    take_step(search.plant, path.step)
+    search.plant.late = path.late
+
+
+def _gone(search: Search, begun: Path) -> Path:
+    """A path to its end: what explains the cycles."""
+    resume(search, begun)
+    before, verdict_before = surely(search, begun.before, begun.verdict_before)
+    if not verdict_before.is_noise and not begun.after.effects:
+        before, verdict_before = as_on_the_bench(search, before, verdict_before, PLAIN)
+    search.say(f"faults only: p = {verdict_before.p_value:.2g}, most visible: {verdict_before.loudest}")
+    alike, as_well = list(begun.alike), list(begun.as_well)
+    after, v = (begun.after, begun.verdict) if begun.after.effects else (before, verdict_before)
+    after, v = grown(search, before, after, v, alike)
+    if not v.is_noise:
+        after, v = exchanged(search, after, v, alike)
+    if not v.is_noise:  # the library had its chance
+        other, w = as_on_the_bench(search, after, v)
+        if other is not after:
+            if after is before:
+                before, verdict_before = other, w
+            after, v = grown(search, before, other, w, alike)
+    if verdict_before.is_noise:
+        after, v = simpler(search, after, v, alike, as_well)
+    plant = search.plant
+    return Path(search.noise, plant.step, plant.late, search.tried, before, verdict_before, after, v, alike, as_well)

@@ -1,0 +1,145 @@
+"""Fewer causes that do as well: one effect for several faults, nothing superfluous, nothing that may be nothing."""
+
+from __future__ import annotations
+
+from ema.core.names import FAULTS
+from ema.effects import registry
+
+from .candidates import Candidate, resolver_zero
+from .forward import SAME
+from .noise import Noise, Verdict
+from .select import CHANCE, Model, Search
+from .verdicts import NEARLY
+from .weighing import ALIKE, is_alike, is_credible, may_be_nothing
+
+
+def with_fewer_faults(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+    """`model`, or where it leaves little, one without faults whose common part an effect of it can be just as well."""
+    if not v.is_noise and model.excess > NEARLY:
+        return model, v
+    for place, effect in enumerate(model.effects):
+        m = search.without_common_faults(model, effect)
+        if m is None or search.left_more(m, model, (search.noise,)) > SAME:
+            continue
+        w = search.verdict(m)
+        if w.is_noise or not v.is_noise:
+            alike[place] = (*alike[place], _in_common(m, effect))
+            model, v = m, w
+            search.say(f"{effect.effect} without {alike[place][-1]}: p = {v.p_value:.2g}")
+    return model, v
+
+
+def _in_common(model: Model, effect: Candidate) -> str:
+    """What an effect of `model` stands for: faults that the model does without, or what its faults have in common."""
+    gone = [name for name in FAULTS if name not in {f.name for f in model.fit.free}]
+    return f"{' and '.join(gone)} alike" if len(gone) > 1 else f"what {' and '.join(effect.faults)} have in common"
+
+
+def _instead(model: Model) -> str:
+    """What the last effect of a model would stand for, told beside the faults."""
+    effect = model.effects[-1]
+    e = registry()[effect.effect]
+    values = {p.name: model.fit.point.get(f"{e.name}.{p.name}", p.neutral) for p in e.parameters}
+    common = _in_common(model, effect)
+    return (
+        f"instead of {common}, {e.said(values)} would explain the record as well; to tell them apart: {e.separated_by}"
+    )
+
+
+def simpler(
+    search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]], as_well: list[str]
+) -> tuple[Model, Verdict]:
+    """`model`, or where it leaves little, one with an effect for several faults that leaves no more.
+
+    With no fewer parameters than `model` it must leave less; what leaves as much is told in `as_well`.
+    What runs differ by depends on the model too, so either is weighed by the noise of both.
+    """
+    if not v.is_noise and model.excess > NEARLY:
+        return model, v
+    as_good = []
+    here = search.noise
+    for m in search.instead_of_faults(model):
+        if m.heldout > model.heldout + NEARLY:
+            continue
+        search.noise = Noise(search.plant, m.fit.point)
+        m = search.model(m.effects, m.fit.free, m.fit.point, m.fit.columns, 1)
+        more = search.left_more(m, model, (here, search.noise))
+        w = search.verdict(m)
+        fewer = len(m.fit.free) < len(model.fit.free)
+        if more < (SAME if fewer else -CHANCE) and (w.is_noise or not v.is_noise):
+            as_good.append((more, m, w, search.noise))
+        elif more < CHANCE and w.is_noise:
+            as_well.append(_instead(m))
+    search.noise = here
+    if not as_good:
+        return model, v
+    least, m, w, search.noise = min(as_good, key=lambda found: found[0])
+    rivals = dict.fromkeys(n.names[-1] for more, n, *_ in as_good if more - least < ALIKE * m.excess + CHANCE)
+    for n in search.alike(model, m, set(rivals)):
+        if search.left_more(n, m, (search.noise,)) < ALIKE * m.excess + CHANCE and is_credible(n):
+            rivals[n.names[-1]] = None
+    alike.append((_in_common(m, m.effects[-1]), *(name for name in rivals if name != m.names[-1])))
+    search.say(f"{m.names[-1]} instead of {alike[-1][0]}: p = {w.p_value:.2g}")
+    return m, w
+
+
+def without_superfluous(
+    search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]
+) -> tuple[Model, Verdict]:
+    """`model` without the effects that others have made superfluous, or that have only led the fit there."""
+    for effect in model.effects:
+        if len(model.effects) > 1 and search.owed_to(model, effect) < CHANCE:
+            model, v = _dropped(search, model, v, alike, effect, "is superfluous")
+    return model, v
+
+
+def without_doubtful(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+    """`model` without the effects whose intervals hold nothing at all: they have only led the fit there."""
+    for effect in model.effects:
+        if may_be_nothing(search, model, effect):
+            model, v = _dropped(search, model, v, alike, effect, "may be nothing")
+    return model, v
+
+
+def _dropped(
+    search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]], effect: Candidate, why: str
+) -> tuple[Model, Verdict]:
+    """`model` without one of its effects, unless more is left without it."""
+    reduced = search.without(model, effect)
+    if reduced.heldout >= model.heldout + SAME:
+        return model, v
+    del alike[model.effects.index(effect)]
+    v = search.verdict(reduced)
+    search.say(f"{effect.effect} {why}: p = {v.p_value:.2g}")
+    return reduced, v
+
+
+def with_zero(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+    """`model` with a commutation that is off with the resolver's zero, if that does at least as well.
+
+    What lies within a step of the user's sensor needs no cause.
+    """
+    zero = search.plant.data.zero
+    if not v.is_noise or "commutation_offset" in model.names or abs(zero) < search.plant.plant.sensors.lvdt_step:
+        return model, v
+    c = resolver_zero(search.plant.plant, zero)
+    made = search.model((*model.effects, c), (*model.fit.free, *c.frees), {**model.fit.point, **c.probes()[0]}, None, 2)
+    w = search.verdict(made)
+    more = search.left_more(made, model, (search.noise,))
+    if not w.is_noise or more > SAME:
+        return model, v
+    alike.append(("a zero of theta_u",) if more > -SAME else ())
+    return made, w
+
+
+def still_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...]) -> tuple[str, ...]:
+    """The rivals of one effect that do as well beside the effects that were found after it."""
+    if place == len(model.effects) - 1:
+        return rivals
+    kept = []
+    for rival in (r for r in rivals if r not in model.names):
+        beside = [m for m in search.tried if m.names and m.names[-1] == rival]
+        m = search.instead(model, model.effects[place], beside[-1]) if beside else model
+        if is_alike(m, model):
+            kept.append(rival)
+    return tuple(kept)

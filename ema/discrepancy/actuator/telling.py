@@ -1,0 +1,205 @@
+"""What is told of a model: effects with intervals and odds, structure, gain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from ema.core.names import FAULTS
+from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
+from ema.effects import registry
+
+from .candidates import Candidate
+from .extension import as_extension
+from .fit import Fit
+from .noise import Verdict
+from .plant import ENVELOPE_STEP, EmaPlant, Point
+from .select import CHANCE, FINAL_SEED, K_SEEN, N_FINAL, Model, Search
+from .structure import structure
+from .weighing import WORTH_IT, is_enough
+
+IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
+FORM = 0.5  # of a value, for a rest as large as the whole effect: the interval holds what would take all of the rest
+NAMED = 0.95  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
+UNCERTAIN_LAW = 0.85  # of a confidence where a rest is left that nothing explains: it may be another law altogether
+ENVELOPE_SETTLING = 15e-3  # [s]
+FAULT_ALARM = 0.02  # a fault that an operator would be told of
+NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none
+
+
+def told(search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]]) -> Findings:
+    """The verdict on `after`, with its effects and their rivals `alike`, structure, gain over `before`, notes."""
+    torque_lines = [c for c in after.effects if c.effect in ("cogging", "torque_line")]
+    odd = [c for c in torque_lines if not _integer(after.fit, c.effect)]
+    further = [c for c in torque_lines if c.effect == "torque_line" and not odd]
+    explained = v.is_noise or is_enough(after, before)
+    verdict: Literal["adequate", "explained", "unexplained"] = (
+        "adequate" if not after.effects and v.is_noise else "explained" if explained and not odd else "unexplained"
+    )
+    notes: list[str] = []
+    shape: dict[str, Any] = {}
+    left = after.excess / max(before.excess, 1e-9)
+    share = 1.0 - left
+    too_little = verdict == "unexplained" and share < NAMED
+    if verdict == "unexplained" or (after.effects and not v.is_noise):
+        base = Model((), before.fit, before.heldout) if odd or too_little else after  # beside what is named
+        shape = structure(search.torques(base), search.plant.plant.control.rate, v.scores)
+    if verdict == "explained" and not v.is_noise:
+        notes.append("a small rest above noise is left: the true law has another form than the library's")
+    if not search.plant.data.has_temperature:
+        notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
+    kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c.effect != "torque_line" and c not in odd]
+    rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
+    found = [_found(search, after, c.effect, a, rest) for c, a in kept]
+    found = [_whatever_the_cause(search, after, e, kept) for e in found]
+    if verdict == "unexplained":
+        found = [replace(e, confidence=UNCERTAIN_LAW * e.confidence) for e in found]
+    if too_little and found:
+        notes.append(
+            f"{', '.join(e.name for e in found)} would explain {share:.0%} of the rest: too little to be named"
+        )
+        found = []
+    for c in odd:
+        at, amplitude = (after.fit.point[f"{c.effect}.{name}"] for name in ("order", "amplitude"))
+        notes.append(f"a torque line at the non-integer order {at:.4g} is no cogging of this motor")
+        shape["orders"] = [{"order": at, "amplitude": amplitude, "share": 1.0 - after.excess / before.excess}]
+        shape["sentences"] = [f"a torque line of {amplitude:.2g} N m at {at:.4g} periods per rotor turn"]
+    tried = [
+        {"name": " + ".join(m.names) or "faults only", "score": -m.heldout}
+        for m in sorted(search.tried, key=lambda m: m.heldout)
+    ]
+    unnamed = [_found(search, after, c.effect, (), rest, "torque_line") for c in (*odd, *further)][:1]
+    if further:
+        values = {name: q.value for name, q in unnamed[0].parameters.items()}
+        unnamed = [replace(unnamed[0], sentence=f"a further {registry()['cogging'].said(values)}")]
+        notes.append(f"beside it stands {unnamed[0].sentence}")
+    return Findings(verdict, found, _gain(search, before, after), shape, tried, notes, unnamed=unnamed)
+
+
+def _left_in_training(before: Model, after: Model) -> float:
+    """Share of what there was beyond noise in training cycles that is left."""
+    return max(after.fit.misfit - 1.0, 0.0) / max(before.fit.misfit - 1.0, 1e-9)
+
+
+def with_function(search: Search, findings: Findings, before: Model, after: Model) -> tuple[Findings, Model]:
+    """What the structure says as a function, simulated: part of the extended plant if held-out cycles gain by it."""
+    base = Model((), before.fit, before.heldout)
+    for effect, values in as_extension(findings.structure).items():
+        table = {f"{effect}.{name}": value for name, value in values.items()}
+        m = search.model((), base.fit.free, {**base.fit.point, **table}, None, 4)
+        if base.excess - m.excess < WORTH_IT * base.excess:
+            continue
+        e = registry()[effect]
+        quantities = {p.name: Quantity(values[p.name], values[p.name], values[p.name], p.unit) for p in e.parameters}
+        unnamed = [FoundEffect(effect, 0.0, (), quantities, e.said(values), e.separated_by)]
+        share = 1.0 - m.excess / base.excess
+        findings.structure["sentences"].append(f"{e.said(values)}, takes {share:.0%} of the rest")
+        return replace(findings, unnamed=unnamed, gain=_gain(search, before, m)), m
+    return findings, after
+
+
+def _integer(fit: Fit, line: str) -> bool:
+    order = fit.point[f"{line}.order"]
+    sd = fit.sd[f"{line}.order"]
+    return abs(order - round(order)) < max(NON_INTEGER, 3.0 * sd)
+
+
+def _found(
+    search: Search, model: Model, effect: str, alike: tuple[str, ...], rest: float, told_as: str = ""
+) -> FoundEffect:
+    """What was fitted as `effect`, told as that or as another effect with the same parameters.
+
+    `rest` is the amplitude of what is left above noise over that of what there was to explain. A fault that the effect
+    took the place of was taken for none; it may be as large as what is not seen.
+    """
+    e = registry()[told_as or effect]
+    fit = model.fit
+    bounds = {f.name: f for f in fit.free}
+    c = next(c for c in model.effects if c.effect == effect)
+    gone = [name for name in c.faults if name not in bounds]
+    small = K_SEEN / np.sqrt(12.0) * np.sqrt(len(gone) * len(c.linear)) / max(len(c.faults), 1)
+    values = {p.name: fit.point.get(f"{effect}.{p.name}", p.neutral) for p in e.parameters}
+    parameters = {}
+    for p in e.parameters:
+        name = f"{effect}.{p.name}"
+        if name in bounds:
+            parts = [fit.sd[name], IMPLEMENTATION * values[p.name], FORM * rest * values[p.name]]
+            sd = float(np.linalg.norm([*parts, small if p.unit == "1" and p.name in c.linear else 0.0]))
+            f = bounds[name]
+            parameters[p.name] = Quantity(
+                values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
+            )
+    own, *_ = odds(search, model, effect)
+    return FoundEffect(e.name, own, alike, parameters, e.said(values), e.separated_by)
+
+
+def _whatever_the_cause(
+    search: Search, model: Model, found: FoundEffect, kept: Sequence[tuple[Candidate, tuple[str, ...]]]
+) -> FoundEffect:
+    """`found` with intervals that hold its parameters beside the rivals of the other effects too."""
+    parameters = dict(found.parameters)
+    for other, rivals in kept:
+        for rival in rivals if other.effect != found.name else ():
+            names = {rival if name == other.effect else name for name in model.names}
+            beside = [m for m in search.tried if len(m.names) == len(model.names) and set(m.names) == names]
+            if not beside:  # faults, or the zero of a sensor
+                continue
+            fit = min(beside, key=lambda m: m.heldout).fit
+            for name, q in parameters.items():
+                p = f"{found.name}.{name}"
+                x, reach = fit.point.get(p, q.value), 1.96 * fit.sd.get(p, 0.0)
+                parameters[name] = replace(q, low=min(q.low, x - reach), high=max(q.high, x + reach))
+    return replace(found, parameters=parameters)
+
+
+def odds(search: Search, model: Model, effect: str, *rivals: str) -> list[float]:
+    """Odds of an effect of `model`, and of its rivals, against all that was tried in its place, by held-out misfit.
+
+    Differences that seeds make do not count; a library is never complete.
+    """
+    place = model.names.index(effect)
+    n = sum(len(search.plant.data.y[c]) for c in search.heldout)
+    best: dict[str, float] = {}
+    for m in search.tried:
+        if len(m.names) > place and m.names[:place] == model.names[:place] and len(m.names) == place + 1:
+            best[m.names[place]] = min(m.heldout, best.get(m.names[place], np.inf))
+    own = best.get(effect, model.heldout)
+    least = min([own, *best.values()])
+    more = {name: max(x - least - CHANCE, 0.0) for name, x in {**best, effect: own}.items()}
+    by_misfit = {name: np.exp(-0.5 * n * x / max(least, 1.0)) for name, x in more.items()}
+    return [float(0.99 * by_misfit.get(name, 0.0) / sum(by_misfit.values())) for name in (effect, *rivals)]
+
+
+def settled(plant: EmaPlant) -> int:
+    """First sample of the envelope that the low-pass no longer ties to the unknown current at the start."""
+    return round(ENVELOPE_SETTLING * plant.plant.control.rate) // ENVELOPE_STEP
+
+
+def envelope_error(search: Search, point: Point, cycles: list[int]) -> float:
+    """Rms of measured less mean simulated envelope over cycles. [A]"""
+    plant = search.plant
+    runs = plant.repeated([point], cycles, N_FINAL, FINAL_SEED)[0]
+    errors = [plant.data.envelopes[c][::ENVELOPE_STEP] - runs[c].envelopes.mean(axis=0) for c in cycles]
+    return float(np.sqrt(np.mean([np.mean(e[settled(plant) :] ** 2) for e in errors])))
+
+
+def _gain(search: Search, before: Model, after: Model) -> Gain:
+    floor = np.sqrt(
+        np.mean([np.mean(search.noise.of(c).envelope_sd[settled(search.plant) :] ** 2) for c in search.heldout])
+        * (1.0 + 1.0 / N_FINAL)
+    )
+    k_before, k_after = (tuple(round(m.fit.point.get(n, 0.0), 5) for n in FAULTS) for m in (before, after))
+    return Gain(
+        envelope_error(search, before.fit.point, search.train),
+        envelope_error(search, after.fit.point, search.train),
+        envelope_error(search, before.fit.point, search.heldout),
+        envelope_error(search, after.fit.point, search.heldout),
+        float(floor),
+        k_before,
+        k_after,
+        sum(x > FAULT_ALARM for x in k_before),
+        sum(x > FAULT_ALARM for x in k_after),
+    )

@@ -1,0 +1,54 @@
+"""Verdicts made sure: by more runs, at the true minimum, under the conditions that the record seems to have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from .comparators import CLEAR, PLAIN, find_step, take_step
+from .noise import N_RUNS_SURE, Noise, Verdict
+from .select import CHANCE, Model, Search
+from .timing import samples_late
+from .weighing import DISTANT
+
+NEARLY = 0.5  # excess of a model that may be the right one but for switching
+
+
+def surely(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
+    """The verdict, in a close case by a null distribution from more runs and by another step of the comparators."""
+    if v.is_noise or model.excess > NEARLY:
+        return model, v
+    search.noise = Noise(search.plant, model.fit.point, N_RUNS_SURE)
+    v = search.verdict(model)
+    return (model, v) if v.is_noise else as_on_the_bench(search, model, v, PLAIN)
+
+
+def as_on_the_bench(search: Search, model: Model, v: Verdict, share: float = CLEAR) -> tuple[Model, Verdict]:
+    """`model` with the command and the grid of the comparators that the record seems to have, if others than ours."""
+    late = samples_late(search.plant, search.noise, model.fit.point, search.train)
+    if late:
+        search.plant.late = late
+        model = search.model(model.effects, model.fit.free, model.fit.point, None, 3)
+        v = search.verdict(model)
+        search.say(f"command {late:+d} samples late: p = {v.p_value:.2g}")
+        if v.is_noise:
+            return model, v
+    step = find_step(search.plant, search.noise, model.fit.point, search.train, share)
+    if step is None:
+        return model, v
+    take_step(search.plant, step)
+    search.noise = Noise(search.plant, model.fit.point, N_RUNS_SURE)
+    model = search.model(model.effects, model.fit.free, model.fit.point, None, 2)
+    v = search.verdict(model)
+    search.say(f"comparators every {1e6 * step:g} µs: p = {v.p_value:.2g}")
+    return model, v
+
+
+def at_the_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
+    """`model` with faults and effects told apart that look nearly the same, as far as the record allows."""
+    if not model.effects or model.excess > DISTANT:
+        return model, v
+    found = search.settled(model)
+    if found.heldout <= model.heldout + CHANCE:
+        return found, search.verdict(found)
+    sd = {name: max(x, found.fit.sd[name]) for name, x in model.fit.sd.items()}  # the record tells no better
+    return replace(model, fit=replace(model.fit, sd=sd)), v
