@@ -9,6 +9,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the daemon: on thirt
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -32,6 +33,16 @@ EPOCH_NS = 1_700_000_000_000_000_000
 @pytest.fixture(scope="session")
 def shipped_plant() -> Actuator:
     return config.load(resources.config("actuator.yaml"), Actuator)
+
+
+SEARCHES = Path(__file__).parent / "discrepancy"
+ALONE = "one by one"  # tests that share clocks, ports and a multicast group; others run beside them (`make test`)
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if SEARCHES not in item.path.parents:
+            item.add_marker(pytest.mark.xdist_group(ALONE))
 
 
 COARSE = {
