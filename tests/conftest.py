@@ -9,7 +9,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the daemon: on thirt
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -21,6 +20,7 @@ from ema_simulator.injection import FaultSource
 from ema_simulator.node import cycles
 from ema_simulator.scenario import Scenario
 from ema_simulator.traffic import Traffic
+from xdist.scheduler import LoadScopeScheduling
 
 from ema import bundle
 from ema.bus import codec
@@ -35,14 +35,15 @@ def shipped_plant() -> Actuator:
     return config.load(resources.config("actuator.yaml"), Actuator)
 
 
-SEARCHES = Path(__file__).parent / "discrepancy"
-ALONE = "one by one"  # tests that share clocks, ports and a multicast group; others run beside them (`make test`)
+class Beside(LoadScopeScheduling):
+    """`make test`: the search for hidden effects beside all that shares clocks, ports and a multicast group."""
+
+    def _split_scope(self, nodeid):
+        return nodeid if nodeid.startswith("tests/discrepancy/") else "one by one"
 
 
-def pytest_collection_modifyitems(items):
-    for item in items:
-        if SEARCHES not in item.path.parents:
-            item.add_marker(pytest.mark.xdist_group(ALONE))
+def pytest_xdist_make_scheduler(config, log):
+    return Beside(config, log)
 
 
 COARSE = {
