@@ -52,20 +52,19 @@ def examined(plant: AxisPlant, progress: Progress = silent) -> Outcome:
 
 def _of_plain(plant: AxisPlant) -> str:
     """The way that leaves clearly least of what no effect explains, or straight."""
-    tried: dict[str, Tried] = {}
-    for way in LATE:
-        plant.between = way
-        tried[way] = base_model(plant)
-        model = tried["straight"]
-        n_free = sum(len(f.free) for f in model.fits)
-        if (
-            way == "straight"
-            and judge(model.held_out, noise_uncertainty=plant.noise_uncertainty, n_free=n_free).is_noise
-        ):
-            return way
+    straight = _plain(plant, "straight")
+    n_free = sum(len(f.free) for f in straight.fits)
+    if judge(straight.held_out, noise_uncertainty=plant.noise_uncertainty, n_free=n_free).is_noise:
+        return "straight"
+    tried = {"straight": straight, **{way: _plain(plant, way) for way in SAID}}
     best = min(tried, key=lambda way: tried[way].rms)
-    much = above_noise(tried[best]) < MUCH * above_noise(tried["straight"])
-    return best if much and compare(tried[best], tried["straight"]).is_clear else "straight"
+    much = above_noise(tried[best]) < MUCH * above_noise(straight)
+    return best if much and compare(tried[best], straight).is_clear else "straight"
+
+
+def _plain(plant: AxisPlant, way: str) -> Tried:
+    plant.between = way
+    return base_model(plant)
 
 
 def _beside(plant: AxisPlant, outcome: Outcome) -> str:
