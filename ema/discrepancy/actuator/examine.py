@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,12 +14,20 @@ from ema.models.actuator import Actuator
 from .conditions import as_recorded
 from .cycles import Measured
 from .gear import swinging
-from .growing import beside, growing, said
+from .growing import beside, growing, said, widened
 from .noise import Noise, Verdict
 from .paths import faults_only, gone_on, resume, shortest, with_faults
 from .plant import EmaPlant
 from .select import Model, Search
-from .simpler import simpler, still_alike, with_fewer_faults, with_zero, without_doubtful, without_superfluous
+from .simpler import (
+    simpler,
+    still_alike,
+    with_fewer_faults,
+    with_temperature_only,
+    with_zero,
+    without_doubtful,
+    without_superfluous,
+)
 from .telling import odds, told, with_function
 from .thinning import thinned
 from .verdicts import at_the_minimum
@@ -78,15 +86,16 @@ def examine(
         paths = faults_only(search, search.noise.point)
     path = shortest(search, paths)
     for turn in range(N_BESIDE):
-        if of_each is None or not path.after.effects or (turn and path.verdict.is_noise):
+        if of_each is None or not path.after.effects:
             break
         resume(search, path)
-        of_each = beside(search, path.after)
-        search = with_faults(search, of_each, path.after.fit.point)
-        path = gone_on(search, path)
+        after, v = with_temperature_only(search, path.after, path.verdict)
+        if turn and path.verdict.is_noise and after is path.after:
+            break
+        of_each = beside(search, after)
+        search = with_faults(search, of_each, after.fit.point)
+        path = gone_on(search, replace(path, after=after, verdict=v))
     resume(search, path)
-    if of_each is not None:
-        conditions.append(said(of_each))
     ema = search.plant
     before, alike = path.before, path.alike
     after, v = settled, _ = at_the_minimum(search, path.after, path.verdict)
@@ -97,6 +106,7 @@ def examine(
     if after is not settled:
         after, v = at_the_minimum(search, after, v)
     after, v = without_doubtful(search, after, v, alike)
+    after, v = with_temperature_only(search, after, v)
     after, v = with_zero(search, after, v, alike)
     sets = [(name, *rivals) for name, rivals in zip(after.names, alike, strict=True)]
     unlikely = [names[0] for names in sets if sum(odds(search, after, *names)) < UNLIKELY]
@@ -104,11 +114,15 @@ def examine(
         after, v, alike = before, path.verdict_before, []
         conditions.append(f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named")
     alike = [still_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
+    if of_each is not None and after.effects:
+        after = widened(search, after)
     findings = told(search, before, after, v, alike)
     if findings.verdict == "adequate":
         conditions.extend(path.as_well)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
         findings, after = with_function(search, findings, before, after)
+    if of_each is not None:
+        conditions.append(said(ema.data.faults, after.fit.point))
     if ema.late:
         side, samples = "late" if ema.late > 0 else "early", "sample" if abs(ema.late) == 1 else "samples"
         conditions.append(f"the recorded command is {abs(ema.late)} {samples} {side} against the other channels")

@@ -19,7 +19,8 @@ from ema.effects import registry
 
 from .candidates import WARMER
 from .features import Array
-from .fit import K_FREE, N_SEEDS, Columns, Fit, Free, fit, free, residuals
+from .fit import K_FREE, N_SEEDS, Columns, Fit, Free, fit, free, residuals, stacked_jacobian
+from .noise import scatter
 from .plant import Point
 from .select import Model, Search
 
@@ -82,7 +83,7 @@ def _flux_per_kelvin(search: Search, of_all: Fit, fits: Sequence[Fit]) -> float:
 
     One cycle does not tell a weaker magnet from shorts of all phases, so the phase with the least has none here.
     """
-    shorts = [name for name in registry()[FLUX].mistaken_for if name in FAULTS]
+    shorts = _shorts()
     k = np.array([[fitted.point[name] for name in shorts] for fitted in fits])
     least = shorts[int(np.argmin(k.mean(axis=0)))]
     frees = [*(f for f in K_FREE if f.name != least), free(CHANGE, FLUX_STEP)]
@@ -105,11 +106,45 @@ def _faults(search: Search, fits: Sequence[Fit]) -> Array:
     return np.clip(search.plant.data.faults + found, 0.0, 1.0)
 
 
-def said(faults: Array) -> str:
-    """The sentence for faults of each cycle, shape (n_cycles, 6)."""
+def widened(search: Search, model: Model) -> Model:
+    """`model` with deviations of its effects that know of faults which are free in every cycle, where they are seen.
+
+    Faults are never negative, so what noise makes of those that are not there does not vanish in the mean: what shorts
+    of all phases have in common in a cycle is missing in the magnet.
+    """
+    data, noise, of_all = search.plant.data, search.noise, model.fit
+    own = [f for f in of_all.free if f.name not in FAULTS]
+    cycles = sorted(search.train)
+    parts = []
+    for c in cycles:
+        k = data.faults[c] + [of_all.point.get(name, 0.0) for name in FAULTS]
+        seen = [f for f, x in zip(K_FREE, k, strict=True) if x > TOLD and (data.motion[c], f.name) in of_all.columns]
+        J = stacked_jacobian(noise, own, of_all.columns, [c])
+        if seen:  # what the cycle's own faults cannot do
+            J_k = stacked_jacobian(noise, seen, of_all.columns, [c])
+            J = J - J_k @ np.linalg.lstsq(J_k, J, rcond=None)[0]
+        parts.append(J)
+    stacked = np.concatenate(parts)
+    solution = np.split(np.linalg.pinv(stacked), np.cumsum([len(x) for x in parts])[:-1], axis=1)
+    sd = np.sqrt(np.diag((1.0 + 1.0 / N_SEEDS) * max(of_all.misfit, 1.0) * scatter(noise, solution, cycles)))
+    wider = {f.name: max(float(x), of_all.sd[f.name]) for f, x in zip(own, sd, strict=True)}
+    if PER_KELVIN in wider:
+        k = np.clip(data.faults + [of_all.point.get(name, 0.0) for name in FAULTS], 0.0, 1.0)
+        common = k[:, [FAULTS.index(name) for name in _shorts()]].min(axis=1)
+        wider[PER_KELVIN] = float(np.hypot(wider[PER_KELVIN], common.max() / np.ptp(data.dT)))
+    return replace(model, fit=replace(of_all, sd={**of_all.sd, **wider}))
+
+
+def _shorts() -> list[str]:
+    return [name for name in registry()[FLUX].mistaken_for if name in FAULTS]
+
+
+def said(faults: Array, point: Point) -> str:
+    """The sentence for faults of each cycle, shape (n_cycles, 6), beyond those of a point."""
+    k = np.clip(faults + [point.get(name, 0.0) for name in FAULTS], 0.0, 1.0)
     ranges = [
         f"{name} {low:.3f} to {high:.3f}"
-        for name, low, high in zip(FAULTS, faults.min(axis=0), faults.max(axis=0), strict=True)
+        for name, low, high in zip(FAULTS, k.min(axis=0), k.max(axis=0), strict=True)
         if high - low > TOLD
     ]
     return f"faults change from cycle to cycle: {', '.join(ranges)}; what is told of them here is their mean"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ema.core.names import FAULTS
 from ema.effects import registry
 
@@ -10,7 +12,7 @@ from .forward import SAME
 from .noise import Noise, Verdict
 from .select import CHANCE, Model, Search
 from .verdicts import NEARLY
-from .weighing import ALIKE, is_alike, is_credible, may_be_nothing
+from .weighing import ALIKE, DOUBTFUL, is_alike, is_credible, may_be_nothing
 
 
 def with_fewer_faults(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
@@ -98,6 +100,25 @@ def without_doubtful(search: Search, model: Model, v: Verdict, alike: list[tuple
     for effect in model.effects:
         if may_be_nothing(search, model, effect):
             model, v = _dropped(search, model, v, alike, effect, "may be nothing")
+    return model, v
+
+
+def with_temperature_only(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
+    """`model` with effects that go with the temperature and no constant part, where that may be nothing."""
+    for place, effect in enumerate(model.effects):
+        constant = f"{effect.effect}.change"
+        if effect.linear != ("change", "per_kelvin"):
+            continue
+        if abs(model.fit.point[constant]) > DOUBTFUL * model.fit.sd[constant]:
+            continue
+        frees = tuple(f for f in effect.frees if f.name != constant)
+        only = replace(effect, frees=frees, linear=effect.linear[1:], steps=effect.steps[1:])
+        effects = (*model.effects[:place], only, *model.effects[place + 1 :])
+        free = [f for f in model.fit.free if f.name != constant]
+        made = search.model(effects, free, {**model.fit.point, constant: 0.0}, model.fit.columns, 4)
+        w = search.verdict(made)
+        if made.heldout < model.heldout + SAME and (w.is_noise or not v.is_noise):
+            model, v = made, w
     return model, v
 
 
