@@ -24,7 +24,8 @@ from .weighing import WORTH_IT, is_enough
 IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
 FORM = 0.5  # of a value, for a rest as large as the whole effect: the interval holds what would take all of the rest
 NAMED = 0.95  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
-UNCERTAIN_LAW = 0.85  # of a confidence where a rest is left that nothing explains: it may be another law altogether
+UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: a rest is left that nothing explains, or
+LITTLE = 2.0  # what faults alone leave is no more than this excess, which two effects together nearly always explain
 ENVELOPE_SETTLING = 15e-3  # [s]
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
 NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none
@@ -55,7 +56,7 @@ def told(search: Search, before: Model, after: Model, v: Verdict, alike: list[tu
     rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
     found = [_found(search, after, c.effect, a, rest) for c, a in kept]
     found = [_whatever_the_cause(search, after, e, kept) for e in found]
-    if verdict == "unexplained":
+    if verdict == "unexplained" or (len(found) > 1 and before.excess < LITTLE):
         found = [replace(e, confidence=UNCERTAIN_LAW * e.confidence) for e in found]
     if too_little and found:
         notes.append(
