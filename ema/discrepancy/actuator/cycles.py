@@ -103,7 +103,7 @@ class Measured:
 def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
     """Check the records against the plant and prepare them; RecordError says in one line what is wrong."""
     commands: list[Array] = []
-    motion, labels, everything = [], [], []
+    labels, everything = [], []
     with_supply = all("u_dc" in record.channels for record in records)
     with_temperature = all("temp_w" in record.channels for record in records)
     for record in records:
@@ -120,13 +120,11 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
             _check_motion(where, s, plant)
             _check_clipping(where, s, plant)
             _check_synchrony(where, s, plant)
-            command = cycle["theta_cmd"]
-            resolution = _step(command[:: positions_every(s.theta_m[0])])
-            motion.append(_motion(commands, command, resolution, plant))
             labels.append(where)
             everything.append((s, cycle))
     signals = [s for s, _ in everything]
     every = positions_every(signals[0].theta_m[0])
+    motion = [_motion(commands, c["theta_cmd"], _step(c["theta_cmd"][::every]), plant) for _, c in everything]
     commands = [between(c, every, _step(c[::every])) for c in commands]
     rest = max(1, round(AT_REST * plant.control.rate))
     user = np.array([_user_at_start(s.theta_u[0], plant.control.rate) for s in signals])

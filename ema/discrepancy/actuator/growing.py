@@ -95,15 +95,14 @@ def _flux_per_kelvin(search: Search, of_all: Fit, fits: Sequence[Fit]) -> float:
         change[c], sd[c] = instead.point[CHANGE], instead.sd[CHANGE]
     dT = search.plant.data.dT
     line, covariance = np.polyfit(dT, change, 1, w=1.0 / sd, cov="unscaled")
-    scatter = float((((change - np.polyval(line, dT)) / sd) ** 2).sum()) / max(len(fits) - 2, 1)
-    slope, slope_sd = float(line[0]), float(np.sqrt(max(scatter, 1.0) * covariance[0, 0]))
+    chi2 = float((((change - np.polyval(line, dT)) / sd) ** 2).sum()) / max(len(fits) - 2, 1)
+    slope, slope_sd = float(line[0]), float(np.sqrt(max(chi2, 1.0) * covariance[0, 0]))
     needed = max(SURELY * slope_sd, 0.0 if PER_KELVIN in of_all.point else TOLD / np.ptp(dT))
     return slope if len(fits) > 2 and abs(slope) > needed else 0.0
 
 
 def _faults(search: Search, fits: Sequence[Fit]) -> Array:
-    found = np.array([[fitted.point.get(name, 0.0) for name in FAULTS] for fitted in fits])
-    return np.clip(search.plant.data.faults + found, 0.0, 1.0)
+    return np.array([_beyond(own, of.point) for own, of in zip(search.plant.data.faults, fits, strict=True)])
 
 
 def widened(search: Search, model: Model) -> Model:
@@ -114,11 +113,11 @@ def widened(search: Search, model: Model) -> Model:
     """
     data, noise, of_all = search.plant.data, search.noise, model.fit
     own = [f for f in of_all.free if f.name not in FAULTS]
+    k = _beyond(data.faults, of_all.point)
     cycles = sorted(search.train)
     parts = []
     for c in cycles:
-        k = data.faults[c] + [of_all.point.get(name, 0.0) for name in FAULTS]
-        seen = [f for f, x in zip(K_FREE, k, strict=True) if x > TOLD and (data.motion[c], f.name) in of_all.columns]
+        seen = [f for f, x in zip(K_FREE, k[c], strict=True) if x > TOLD and (data.motion[c], f.name) in of_all.columns]
         J = stacked_jacobian(noise, own, of_all.columns, [c])
         if seen:  # what the cycle's own faults cannot do
             J_k = stacked_jacobian(noise, seen, of_all.columns, [c])
@@ -129,7 +128,6 @@ def widened(search: Search, model: Model) -> Model:
     sd = np.sqrt(np.diag((1.0 + 1.0 / N_SEEDS) * max(of_all.misfit, 1.0) * scatter(noise, solution, cycles)))
     wider = {f.name: max(float(x), of_all.sd[f.name]) for f, x in zip(own, sd, strict=True)}
     if PER_KELVIN in wider:
-        k = np.clip(data.faults + [of_all.point.get(name, 0.0) for name in FAULTS], 0.0, 1.0)
         common = k[:, [FAULTS.index(name) for name in _shorts()]].min(axis=1)
         wider[PER_KELVIN] = float(np.hypot(wider[PER_KELVIN], common.max() / np.ptp(data.dT)))
     return replace(model, fit=replace(of_all, sd={**of_all.sd, **wider}))
@@ -139,9 +137,14 @@ def _shorts() -> list[str]:
     return [name for name in registry()[FLUX].mistaken_for if name in FAULTS]
 
 
+def _beyond(faults: Array, point: Point) -> Array:
+    """Faults beyond those of a point, (6,) or one row for each cycle, as wholes."""
+    return np.clip(faults + [point.get(name, 0.0) for name in FAULTS], 0.0, 1.0)
+
+
 def said(faults: Array, point: Point) -> str:
     """The sentence for faults of each cycle, shape (n_cycles, 6), beyond those of a point."""
-    k = np.clip(faults + [point.get(name, 0.0) for name in FAULTS], 0.0, 1.0)
+    k = _beyond(faults, point)
     ranges = [
         f"{name} {low:.3f} to {high:.3f}"
         for name, low, high in zip(FAULTS, k.min(axis=0), k.max(axis=0), strict=True)
