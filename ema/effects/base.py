@@ -72,7 +72,7 @@ class Effect:
     sentence : str
         What an engineer would say, with the parameters' names in braces.
     besides : mapping of str to str
-        What is added to the sentence where the parameter of that name is not neutral.
+        What is added to the sentence where the parameter of that name is not neutral; several with "and" between.
     mistaken_for : tuple of str
         Faults a monitor without this effect would report.
     separated_by : str
@@ -109,4 +109,4 @@ class Effect:
         neutral = self.neutral()
         full = {**neutral, **values}
         besides = [text for name, text in self.besides.items() if full[name] != neutral[name]]
-        return "".join([self.sentence, *besides]).format(**full)
+        return (self.sentence + " and".join(besides)).format(**full)

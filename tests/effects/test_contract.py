@@ -47,6 +47,14 @@ def test_declaration(effect):
         assert len(inspect.signature(law).parameters) == n_arguments
 
 
+def test_only_what_is_not_neutral_is_said():
+    flux = registry()["magnet_flux"]
+    assert flux.said({"per_kelvin": -0.001}) == "magnet flux changed by -0.10% per kelvin above 20 °C"
+    assert flux.said({"change": -0.05}) == "magnet flux changed by -5.0%"
+    both = "magnet flux changed by -5.0% and by -0.10% per kelvin above 20 °C"
+    assert flux.said({"change": -0.05, "per_kelvin": -0.001}) == both
+
+
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
 def test_laws_are_neutral_at_their_neutral_values(effect):
     rng = np.random.default_rng(1)

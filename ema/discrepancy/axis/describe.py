@@ -44,11 +44,10 @@ def effects(plant: AxisPlant, found: Sequence[Candidate], point: Point, drawn: S
                     spread = value + np.angle(np.exp(1j * (spread - value)))
                 low, high = np.percentile(spread, INTERVAL) if spread.size else (value, value)
                 parameters[name] = {"value": value, "low": float(low), "high": float(high), "unit": unit[name]}
-            full = {**effect.neutral(), **values}
             entry = {
                 "key": candidate.key,
                 "name": effect.name,
-                "sentence": effect.sentence.format(**full),
+                "sentence": effect.said(values),
                 "separated_by": effect.separated_by,
                 "mistaken_for": list(effect.mistaken_for),
                 "parameters": parameters,
