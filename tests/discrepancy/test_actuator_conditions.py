@@ -87,6 +87,20 @@ def test_an_angle_within_one_turn_is_the_same_angle(cycles, shipped_plant):
         np.testing.assert_allclose(a.theta_m, b.theta_m, atol=1e-9)
 
 
+@pytest.mark.parametrize("decimals", [5, 6, 7, 15])
+@pytest.mark.parametrize("bits", [12, 16])
+def test_steps_of_the_rotor_angle_are_seen_however_few_decimals_a_record_has(cycles, shipped_plant, bits, decimals):
+    """Sixteen bits in a file with seven decimals had been no steps, and a torque seven times as noisy as expected."""
+    step = 2.0 * np.pi / 2**bits
+    record = prepared(shipped_plant, cycles, theta_m=lambda x: np.round(step * np.round(x / step), decimals))
+    assert record.angle_step == pytest.approx(step, rel=1e-4)
+    assert record.angle_noise == 0.0
+
+
+def test_an_angle_without_steps_has_none(cycles, shipped_plant):
+    assert prepared(shipped_plant, cycles).angle_step == 0.0
+
+
 @pytest.mark.slow
 def test_a_noisier_sensor_is_neither_an_effect_nor_a_fault(hidden, shipped_plant):
     rng = np.random.default_rng(4)

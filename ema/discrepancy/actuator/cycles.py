@@ -33,6 +33,8 @@ AT_REST = 1e-3  # [s] at the start of a cycle, over which the position is averag
 CLEAR = 4.0  # standard deviations
 STARTING = (10e-3, 7e-3, 5e-3, 3.5e-3, 2.5e-3)  # [s] at the start of a cycle
 SAME_COMMAND, LOCAL = 1e-6, 5e-3  # [rad] by which commands of one motion may differ in the mean over [s]
+COUNTED = (4.0, 100.0, np.inf)  # steps between values that a rough, a better and a good step tell apart
+OFF_GRID = 0.2  # of a step, by which few decimals may put values beside it
 AS_NOISE = 1.15  # times the noise that a curve through it may leave
 
 
@@ -211,15 +213,19 @@ def _user_at_start(theta_u: Array, rate: float) -> tuple[float, float]:
 
 
 def _step(x: Array) -> float:
-    """Resolution of a channel: the smallest step between its values if all values are multiples of it, else 0."""
+    """Resolution of a channel: the distance of the grid on which its values lie, as few decimals round them, else 0."""
     values = np.unique(np.round(x, 10))  # interpolation leaves rounding
     if len(values) < 3:
         return 0.0
-    step = float(np.diff(values).min())
+    gaps = np.diff(values)
+    step = float(gaps.min())
     if step < 1e-6:
         return 0.0
-    off = np.diff(values) / step
-    return step if np.abs(off - np.round(off)).max() < 0.02 else 0.0
+    for reach in COUNTED:  # few decimals make the least gap too small, the more so the wider ones
+        narrow = gaps[gaps < reach * step]
+        step = float(narrow.sum() / np.round(narrow / step).sum())
+    off = gaps / step
+    return step if np.abs(off - np.round(off)).max() < OFF_GRID else 0.0
 
 
 def _white_noise(channels: Sequence[Array]) -> float:
