@@ -14,6 +14,8 @@ from ema.models.axis_config import Axis, LinearAxis
 
 MIN_SAMPLES = 40
 MAX_LAG = 30  # samples; less is a delay that can be examined
+ENTERING = 3  # samples before a limit, over which a position shows that it slows down
+NOT_SLOWED = 0.4  # of its usual speed
 ONE_SCALE = 1.25  # ratio of the recorded speed to that of the position
 IN_STEP = 0.8  # correlation of the torque that the motion needs with the recorded one
 DRIVE_CHANNEL = {"current": "i_q", "voltage": "u_q", "force": "force", "speed-loop": "w_ref"}
@@ -54,7 +56,7 @@ def roles(plant: Axis, record: Record) -> Roles:
             f"{record.name}: the axis does not move ({' and '.join(moving)} constant): nothing to compare"
         )
     _finite(record, (drive, *outputs))
-    _not_clipped(record, (drive, *moving))
+    _not_clipped(record, (drive, *moving), position)
     if speed in have and position in have:
         _one_scale(record, position, speed)
     if speed in have and kind in ("current", "force"):
@@ -134,8 +136,8 @@ def _alike(x: Array, y: Array, lag: int) -> float:
     return float(a @ b) / size if size > 0.0 else 0.0
 
 
-def _not_clipped(record: Record, names: tuple[str, ...]) -> None:
-    """A sensor at its limit shows runs of exactly its largest value."""
+def _not_clipped(record: Record, names: tuple[str, ...], position: str) -> None:
+    """A sensor at its limit shows runs of exactly its largest value; a position does where the axis rests there too."""
     for name in names:
         x = np.concatenate([cycle[name] for cycle in record])
         if len(np.unique(x)) < 5:  # a commanded step or constant is no clipping
@@ -143,11 +145,22 @@ def _not_clipped(record: Record, names: tuple[str, ...]) -> None:
         for limit in (x.max(), x.min()):
             share = float(np.mean(x == limit))
             longest = _longest_run(x == limit)
-            if share > 0.03 and longest >= 5:
+            if share > 0.03 and longest >= 5 and (name != position or _is_cut_off(x, limit)):
                 raise RecordError(
                     f"{record.name}: {name} is clipped at {limit:g} {CHANNELS[name].unit} "
                     f"({share:.0%} of the samples): a longer range or a smaller motion is needed"
                 )
+
+
+def _is_cut_off(x: Array, limit: float) -> bool:
+    """Whether a position arrives at its limit without having slowed down, as no axis does that comes to rest there."""
+    moves = np.abs(x[ENTERING:] - x[:-ENTERING])
+    at = x == limit
+    arrivals = np.flatnonzero(at[1:] & ~at[:-1]) + 1 - ENTERING
+    arrivals = arrivals[arrivals >= 0]
+    finest = np.abs(np.diff(np.unique(x))).min()
+    typical = max(NOT_SLOWED * float(np.sqrt(np.mean(moves**2))), ENTERING * finest)
+    return bool(arrivals.size) and float(np.median(moves[arrivals])) > typical
 
 
 def _longest_run(flags: np.ndarray) -> int:
