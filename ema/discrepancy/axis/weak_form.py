@@ -136,14 +136,19 @@ def _padded(x: np.ndarray, width: int, *, repeat: bool) -> np.ndarray:
 
 
 def bump(half: int, power: int = 4) -> tuple[Array, Array, Array]:
-    """Bump (1 - s²)^p on 2 `half` + 1 samples with unit sum, and its first and second derivative per sample."""
+    """Bump (1 - s²)^p on 2 `half` + 1 samples with unit sum, and its first and second derivative per sample.
+
+    As sums these hold exactly what they do as integrals: ∫ φ' t = -1, ∫ φ'' = 0, ∫ φ'' t²/2 = 1. An angle far from
+    zero would else be a torque.
+    """
     s = np.linspace(-1.0, 1.0, 2 * half + 3)[1:-1]
-    h = s[1] - s[0]
+    n = np.arange(-half, half + 1)
     phi = (1.0 - s**2) ** power
     first = power * (1.0 - s**2) ** (power - 1) * (-2.0 * s)
     second = power * ((power - 1) * (1.0 - s**2) ** (power - 2) * 4.0 * s**2 - 2.0 * (1.0 - s**2) ** (power - 1))
-    total = phi.sum()
-    return phi / total, first * h / total, second * h * h / total
+    phi /= phi.sum()
+    second -= second.sum() * phi
+    return phi, -first / (first @ n), 2.0 * second / (second @ n**2)
 
 
 def _moving(plant: AxisPlant, model: axis.Model, j: int, offset: int, zero: float) -> tuple[Weak, tuple[Array, ...]]:
