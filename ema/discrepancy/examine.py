@@ -36,6 +36,7 @@ MAX_ADDED = 5  # of both kinds, further lines of a kind that is there already co
 MANY = 12  # free parameters from which an effect is revised beside its strongest rivals only
 N_RIVALS = 6
 EXPLAINED = 1.2  # held-out residual over noise up to which a model counts as explaining the data
+UNLIKELY = 0.1  # odds of an effect with all that the data cannot tell from it, below which it is not named
 MIMICKED = 0.02  # of an effect's mark in power, where less is left of it beside the base parameters it cannot be seen
 
 
@@ -59,6 +60,7 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
     notes: list[str] = []
     _select(plant, state, progress)
     _revise(plant, state, progress)
+    _without_unlikely(plant, state, progress)
     plain = state.plain
     verdict = _judged(plant, plain)
     progress("final fit")
@@ -235,14 +237,38 @@ def _without(point: Point, candidate: Candidate, base: set[str]) -> Point:
     return {name: value for name, value in point.items() if name in base or name not in own}
 
 
+def _without_unlikely(plant: Plant, state: _State, progress: Progress) -> None:
+    """Leave out effects that are no causes: what they explain is a rest without a name.
+
+    These are the unlikeliest together with all that the data cannot tell from them, and, where much stays unexplained,
+    those that lean on the bounds of what is credible.
+    """
+    while True:
+        accepted = [c for c in state.model.accepted if not c.is_structure]
+        trust = _trust(plant, state) if accepted else {}
+        explained = _is_explained(plant, state.plain, state.model)
+        odds = {}
+        for c, (trials, before) in zip(state.model.accepted, state.rounds, strict=True):
+            if c in accepted:
+                weights = _weights(trials, before)
+                told = {c.key, *(key for key in alike(trials, c.key, before) if key in weights)}
+                no_cause = not explained and any(_leans(fitted, c) for fitted in state.model.fits)
+                odds[c.key] = 0.0 if no_cause else trust[c.key] * sum(weights[key] for key in told)
+        worst = min(odds, key=lambda key: odds[key], default=None)
+        if worst is None or odds[worst] >= UNLIKELY:
+            return
+        progress(f"without {worst}, which is unlikely")
+        k = [c.key for c in state.model.accepted].index(worst)
+        state.model = _leave_out(plant, state.model, {k})
+        del state.rounds[k]
+
+
 def _effects(plant: Plant, state: _State, point: Any, draw: Any) -> list[dict[str, Any]]:
     accepted = state.model.accepted
     named = [c for c in accepted if not c.is_structure]
     if not named:
         return []
     trust = _trust(plant, state)
-    for c in named:  # a law that wants to leave its bounds is not the one that is missing
-        trust[c.key] *= 0.5 if any(_at_bound(f, point[f.name]) for f in c.free) else 1.0
     rounds = dict(zip((c.key for c in accepted), state.rounds, strict=True))
     out = []
     for entry in plant.describe(named, point, draw):
@@ -260,6 +286,11 @@ def _effects(plant: Plant, state: _State, point: Any, draw: Any) -> list[dict[st
             }
         )
     return out
+
+
+def _leans(fitted: Fit, candidate: Candidate) -> bool:
+    """Whether a law leans on its bounds: then it is not the one that is missing."""
+    return any(_at_bound(f, fitted.point[f.name]) for f in candidate.free)
 
 
 def _at_bound(free: Free, value: float) -> bool:
@@ -288,6 +319,9 @@ def _trust(plant: Plant, state: _State) -> dict[str, float]:
     for key, mark in marks.items():
         others = sum(marks.values()) - mark
         trust[key] = mark / (mark + unknown + FORM**2 * others) if mark > 0.0 else 0.0
+    for c in accepted:
+        if c.key in trust and _leans(state.model.fits[0], c):
+            trust[c.key] *= 0.5
     return trust
 
 

@@ -12,6 +12,9 @@
 `gear`          the scan for a resonance of a gear that gives
 `zeros`         angle zeros of records given together
 `stretch`       the search for a stretch of other friction
+`predictable`   how long windows may be
+`fading`        the search for the speed over which friction falls
+`linear`        metres and newtons in what is said
 `between`       what the drive does between samples
 `structure`     terms suggested by the torque residual when no effect explains it
 `plant`         all of it as the engine's `Plant`

@@ -13,6 +13,7 @@ from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
 from .cogging import cogging_candidate
+from .fading import fading_candidate
 from .gear import gear_candidate
 from .stretch import stretch_candidate
 
@@ -95,6 +96,7 @@ def library(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candi
         cogging_candidate(plant, point, blocks),
         gear_candidate(plant, point, blocks),
         stretch_candidate(plant, s, point, blocks),
+        fading_candidate(plant, s, point, blocks),
     )
     return [*found, *(c for c in searched if c is not None)]
 
@@ -142,18 +144,9 @@ def _quadratic(plant: AxisPlant, s: Sizes) -> _Spec:
     return {"coefficient": (0.0, 3.0 * c, (0.05 * c,), 0.05 * c)}
 
 
-def _stribeck(plant: AxisPlant, s: Sizes) -> _Spec:
-    w = s.speed
-    return {
-        "excess": (0.0, 3.0, (0.3,), 0.1),
-        "speed": (0.01 * w, w, (0.03 * w, 0.1 * w, 0.3 * w), 0.05 * w),
-        "shape": (0.0, 1.2, (0.0, 1.0), 0.2),
-    }
-
-
 def _spring(plant: AxisPlant, s: Sizes) -> _Spec | None:
-    k = s.torque / s.half_range
-    return {"stiffness": (-5.0 * k, 5.0 * k, (0.05 * k,), 0.05 * k)}
+    k = s.torque / s.half_range  # near a resonance it moves farther than the drive could hold it
+    return {"stiffness": (-50.0 * k, 50.0 * k, (0.05 * k, 2.0 * k), 0.05 * k)}
 
 
 def _flux(plant: AxisPlant, s: Sizes) -> _Spec | None:
@@ -233,7 +226,6 @@ def _drive_offset(plant: AxisPlant, s: Sizes) -> _Spec | None:
 _BUILDERS: dict[str, Callable[[AxisPlant, Sizes], _Spec | None]] = {
     "viscous_drag": _viscous,
     "quadratic_drag": _quadratic,
-    "stribeck": _stribeck,
     "asymmetric_friction": lambda plant, s: {"asymmetry": (-0.95, 0.95, (0.1,), 0.05)},
     "load_friction": lambda plant, s: {"per_torque": (0.0, 20.0 / s.torque, (0.2 / s.torque,), 0.1 / s.torque)},
     "constant_load": lambda plant, s: {

@@ -15,7 +15,6 @@ from ema.models.axis_config import LinearAxis
 
 from .naming import line
 from .weak_form import Weak, weak_form
-from .windows import Bench
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -24,8 +23,6 @@ MAX_ORDER = 240
 MAX_LINES = 8
 MIN_LINE = 0.03  # of the strongest line: weaker ones are not worth a name
 MAX_ROWS = 2500
-N_GROWTHS = 3.0  # growth of e^3 in a window
-LONGEST_WINDOW = 0.4  # [s]
 ALARM = 1e-4  # of a line that is not there, over all orders
 
 
@@ -44,8 +41,7 @@ def scan(weak: Weak, orders: Array, max_lines: int = MAX_LINES, alarm: float = A
     """Forward orthogonal selection of angle-locked lines beside friction, viscous drag, inertia and a constant."""
     y = weak.y / weak.sigma
     m = weak.motion
-    always = [np.ones(len(m.theta)), np.sign(m.direction), m.w]
-    A = np.stack([*(weak.integrate(f) / weak.sigma for f in always), weak.inertia / weak.sigma], axis=1)
+    A = np.stack(weak.always(), axis=1) / weak.sigma[:, None]
     angles = m.theta[:, None] * orders
     parts = [weak.integrate(f(angles)) / weak.sigma[:, None] for f in (np.cos, np.sin)]
     lines = np.stack(parts, axis=2).transpose(1, 0, 2)  # (n_orders, n_y, 2)
@@ -71,7 +67,7 @@ def scan(weak: Weak, orders: Array, max_lines: int = MAX_LINES, alarm: float = A
         return Scan((), np.empty((0, 2)))
     coefficients, *_ = np.linalg.lstsq(np.concatenate([A, *lines[chosen]], axis=1), y, rcond=None)
     found = coefficients[A.shape[1] :].reshape(-1, 2)
-    return Scan(tuple(float(orders[k]) for k in chosen), found, float(-coefficients[A.shape[1] - 1]))
+    return Scan(tuple(float(orders[k]) for k in chosen), found, float(coefficients[A.shape[1] - 1]))
 
 
 def thinned(weak: Weak) -> Weak:
@@ -129,22 +125,3 @@ def cogging_candidate(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> 
         J = next(f for f in plant.base if f.name == "J")
         starts.append({**start, "J": min(max(float(point["J"]) + found.inertia, J.low), J.high)})
     return Candidate("cogging", "cogging", tuple(free), tuple(starts), dict.fromkeys(start, 0.0))
-
-
-def predictable(plant: AxisPlant, bench: Bench) -> float:
-    """Length of time over which the motion of a record can be foretold from a start state. [s]
-
-    An angle-locked torque A sin nθ makes deviations grow like exp(λ t), λ² = A n / J; after a few of these the
-    start state's noise decides.
-    """
-    moving = [j for j, w in enumerate(plant.windows) if w.group == bench.name and not w.static]
-    if isinstance(plant.plant, LinearAxis) or not moving:
-        return LONGEST_WINDOW
-    weak = thinned(weak_form(plant, {}, moving))
-    orders = integer_orders(weak)
-    if len(orders) == 0 or len(weak.y) < 30:
-        return LONGEST_WINDOW
-    found = scan(weak, orders, max_lines=2)
-    stiffness = max((float(np.hypot(*p)) * n for n, p in zip(found.orders, found.parts, strict=True)), default=0.0)
-    growth = np.sqrt(stiffness / plant.plant.inertia)
-    return float(min(LONGEST_WINDOW, N_GROWTHS / growth)) if growth > 0.0 else LONGEST_WINDOW

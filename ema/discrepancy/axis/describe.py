@@ -12,6 +12,7 @@ from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
 from .cogging import MIN_LINE
+from .linear import in_metres
 from .naming import numbers_of
 
 if TYPE_CHECKING:
@@ -36,7 +37,8 @@ def effects(plant: AxisPlant, found: Sequence[Candidate], point: Point, drawn: S
             if effect.name == "cogging" and values["amplitude"] < MIN_LINE * strongest:
                 continue
             key = _key(own.effects, values)
-            unit = {p.name: p.unit for p in effect.parameters}
+            said = in_metres if isinstance(plant.plant, LinearAxis) else str
+            unit = {p.name: said(p.unit) for p in effect.parameters}
             parameters = {}
             for name, value in values.items():
                 spread = np.array([s.effects[key][name] for s in samples if key in s.effects])
@@ -47,7 +49,7 @@ def effects(plant: AxisPlant, found: Sequence[Candidate], point: Point, drawn: S
             entry = {
                 "key": candidate.key,
                 "name": effect.name,
-                "sentence": effect.said(values),
+                "sentence": said(effect.said(values)),
                 "separated_by": effect.separated_by,
                 "mistaken_for": list(effect.mistaken_for),
                 "parameters": parameters,
@@ -125,8 +127,11 @@ def _sentence(family: str, v: dict[str, float], unit: str) -> tuple[str, list[st
     if v["order"]:
         times = " per ampere" if v["current_power"] else ""
         nature = "" if abs(v["order"] - round(v["order"])) < 0.02 else ", no whole number: no part of the motor itself"
+        where = f"with {v['order']:.4g} periods per turn{nature}"
+        if unit == "N":
+            where = f"over the travel, once in {2.0 * np.pi / v['order']:.3g} m"
         return (
-            f"{what} varies by {size:.3g} {unit}{times} with {v['order']:.4g} periods per turn{nature}",
+            f"{what} varies by {size:.3g} {unit}{times} {where}",
             ["angle", *(["current"] if v["current_power"] else [])],
         )
     if v["frequency"]:

@@ -17,10 +17,10 @@ from ema.models.axis_config import INSTANCE, Axis
 from ema.models.axis_layout import row
 
 from . import candidates, describe, structure
-from .cogging import LONGEST_WINDOW, predictable
 from .naming import Numbers, numbers_of
 from .noise import ESTIMATE_UNCERTAINTY
 from .pack import Pack
+from .predictable import LONGEST_WINDOW, predictable
 from .whitening import Filter, design, open_loop_variance
 from .windows import START_NOISE, Bench, Window, bench, speed_noise
 from .zeros import zeros

@@ -78,12 +78,14 @@ class Weak:
         """∫ φ_k f dt of values at the motion's samples, shape (n_samples,) or (n_samples, n_columns)."""
         return np.asarray(self._matrix @ f)
 
-    def beside(self) -> tuple[Array, Array]:
-        """Orthonormal columns (n_y, 4) of a constant, friction, drag, inertia over σ, and what y/σ has beside them."""
+    def always(self) -> list[Array]:
+        """What may always be other than in the plant file, (n_y,) each: a constant, friction, drag, inertia."""
         m = self.motion
-        always = [np.ones(len(m.theta)), np.sign(m.direction), m.w]
-        columns = [*(self.integrate(f) / self.sigma for f in always), self.inertia / self.sigma]
-        q, _ = np.linalg.qr(np.stack(columns, axis=1))
+        return [*(self.integrate(f) for f in (np.ones(len(m.theta)), np.sign(m.direction), m.w)), self.inertia]
+
+    def beside(self) -> tuple[Array, Array]:
+        """Orthonormal columns (n_y, 4) of `always` over σ, and what y/σ has beside them."""
+        q, _ = np.linalg.qr(np.stack(self.always(), axis=1) / self.sigma[:, None])
         y = self.y / self.sigma
         return q, y - q @ (q.T @ y)
 
