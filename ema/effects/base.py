@@ -16,9 +16,11 @@ emf_factor            i_j [A], ΔT [K]                                          
 resistance_factor     ΔT [K]                                                     product on R_j          1
 inductance_factor     i_j [A]                                                    product on L_j          1
 angle_error           θ_m [rad]                                                  sum, on the resolver    0 rad
+position_error        θ_m [rad]                                                  sum, on the angle only  0 rad
 ====================  =========================================================  ======================  ========
 
-ΔT is the winding temperature less 20 °C. A tabulated torque is a shaft torque that costs a fifth of a step.
+ΔT is the winding temperature less 20 °C. The speed of a resolver has the slope of its angle's error; an error on the angle only
+leaves a speed from another sensor as it is. A tabulated torque is a shaft torque that costs a fifth of a step.
 A kernel is compiled with those parts of the library only that its runs need (`ema.models.parts`). An effect without
 laws is *structural*: the model itself reads its parameters (a delay, a dead time, a second inertia).
 """
@@ -40,6 +42,7 @@ HOOKS = MappingProxyType(
         "resistance_factor": ("product", 1),
         "inductance_factor": ("product", 1),
         "angle_error": ("sum", 1),
+        "position_error": ("sum", 1),
     }
 )
 

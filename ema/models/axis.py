@@ -145,10 +145,13 @@ def loads_after(
     return out
 
 
-def true_state(numbers: Model, measured: Array) -> Array:
-    """Position and speed behind measured ones (n, 2): the sensor's angle error undone."""
+def true_state(numbers: Model, measured: Array, *, derived: bool) -> Array:
+    """Position and speed behind measured ones (n, 2): the sensors' angle errors undone.
+
+    `derived`: the speed was not measured but taken from the position.
+    """
     out = np.empty(measured.shape)
-    kernel.undo_angle_error(numbers.z, measured, out)
+    kernel.undo_angle_error(numbers.z, measured, derived, out)
     return out
 
 

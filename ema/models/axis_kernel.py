@@ -39,6 +39,7 @@ emf_factor = combined("emf_factor", "axis", row)
 resistance_factor = combined("resistance_factor", "axis", row)
 inductance_factor = combined("inductance_factor", "axis", row)
 angle_error = combined("angle_error", "axis", row)
+position_error = combined("position_error", "axis", row)
 
 J, C, F_S, F_D, K_T, K_E, R, L = (row(name) for name in ("J", "C", "F_s", "F_d", "k_t", "k_e", "R", "L"))
 K_W, I_MAX, DT = row("K_w"), row("I_max"), row("dT")
@@ -259,9 +260,8 @@ def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
         w0 = out[1, 0]
         theta = delayed(t, out[0], k, z[POSITION_DELAY], w0) if z[POSITION_DELAY] > 0.0 else out[0, k]
         w = delayed(t, out[1], k, z[SPEED_DELAY], slope) if z[SPEED_DELAY] > 0.0 else out[1, k]
-        ahead = angle_error(z, 0, 1, theta + 1e-3) - angle_error(z, 0, 1, theta - 1e-3)
-        out[0, k] = theta + angle_error(z, 0, 1, theta)
-        out[1, k] = w * (1.0 + ahead / 2e-3)
+        out[0, k] = theta + angle_error(z, 0, 1, theta) + position_error(z, 0, 1, theta)
+        out[1, k] = w * (1.0 + _slope(z, theta, False))
         if mode in (CURRENT, SPEED_LOOP):
             out[2, k] = out[2, k] * (1.0 + z[GAIN]) + z[OFFSET]
 
@@ -292,15 +292,24 @@ def holding_current(z, lines, terms, theta, direction, t, out):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def undo_angle_error(z, measured, out):
-    """True position and speed (n, 2) from measured ones."""
+def _slope(z, theta, of_position):
+    """Slope of the error of an angle from which a speed is derived: the resolver's, or the recorded position's."""
+    a, b = theta - 1e-3, theta + 1e-3
+    ahead = angle_error(z, 0, 1, b) - angle_error(z, 0, 1, a)
+    if of_position:
+        ahead += position_error(z, 0, 1, b) - position_error(z, 0, 1, a)
+    return ahead / 2e-3
+
+
+@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
+def undo_angle_error(z, measured, of_position, out):
+    """True position and speed (n, 2) from measured ones; `of_position`: the speed was derived from the position."""
     for k in range(measured.shape[0]):
         theta = measured[k, 0]
         for _ in range(3):
-            theta = measured[k, 0] - angle_error(z, 0, 1, theta)
-        ahead = angle_error(z, 0, 1, theta + 1e-3) - angle_error(z, 0, 1, theta - 1e-3)
+            theta = measured[k, 0] - angle_error(z, 0, 1, theta) - position_error(z, 0, 1, theta)
         out[k, 0] = theta
-        out[k, 1] = measured[k, 1] / (1.0 + ahead / 2e-3)
+        out[k, 1] = measured[k, 1] / (1.0 + _slope(z, theta, of_position))
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)

@@ -195,6 +195,10 @@ def _resolver(plant: AxisPlant, s: Sizes) -> _Spec | None:
     return {name: (-0.2, 0.2, (1e-3,), 0.01) for name in parts}
 
 
+def _encoder(plant: AxisPlant, s: Sizes) -> _Spec | None:
+    return _resolver(plant, s) if _has(plant, "theta_m") and _has(plant, "w_m") else None
+
+
 def _speed_delay(plant: AxisPlant, s: Sizes) -> _Spec | None:
     if not (_has(plant, "w_m") or _has(plant, "v")):
         return None
@@ -238,6 +242,7 @@ _BUILDERS: dict[str, Callable[[AxisPlant, Sizes], _Spec | None]] = {
     "supply_sag": _sag,
     "saturation": _saturation,
     "resolver_error": _resolver,
+    "encoder_error": _encoder,
     "speed_delay": _speed_delay,
     "position_delay": _position_delay,
     "clock_skew": lambda plant, s: {"rate": (-0.05, 0.05, (0.002,), 0.002)},
