@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,12 +9,9 @@ import numpy as np
 from ema.bus.codec import Codec
 from ema.bus.identifiers import with_actuator
 from ema.bus.protection import Sender
+from ema.bus.span import MOTION_RATIO, SAMPLES_PER_FRAME, Span
 
 from .fleet import CycleData
-
-_PER_FRAME = 10  # samples in a frame, as the DBC lays them out
-_MOTION_EVERY = 10  # current samples to one motion sample
-_CHIRP = 0
 
 
 class Traffic:
@@ -34,6 +30,7 @@ class Traffic:
         self._numbers = numbers
         self._stagger = stagger
         self._sender = Sender()
+        self._chirp = codec.number("CycleStart", "motion_kind", "chirp")
 
     def frames(self, cycle: CycleData, period: float) -> tuple[np.ndarray, np.ndarray]:
         """Everything the actuators send from the start of a cycle to the start of the next.
@@ -55,23 +52,15 @@ class Traffic:
         """Frames of one actuator with their due times; frames due together keep this order."""
         number, response = self._numbers[lane], cycle.response
         n_times, dt = cycle.t.size, float(cycle.t[1] - cycle.t[0])
-        slow = slice(0, n_times, _MOTION_EVERY)
-        n_current = math.ceil(n_times / _PER_FRAME)
-        n_motion = math.ceil(math.ceil(n_times / _MOTION_EVERY) / _PER_FRAME)
+        slow = slice(0, n_times, MOTION_RATIO)
+        first_current, first_motion = (self._next_sequence(name, number) for name in ("PhaseCurrents", "Motion"))
+        span = Span(cycle.number, first_current, first_motion, n_times, dt, self._chirp)
         begin = lane * self._stagger
-        due_current = begin + np.arange(1, n_current + 1) * _PER_FRAME * dt
-        due_motion = begin + np.arange(1, n_motion + 1) * _PER_FRAME * _MOTION_EVERY * dt
+        due_current = begin + np.arange(1, span.n_currents + 1) * SAMPLES_PER_FRAME * dt
+        due_motion = begin + np.arange(1, span.n_motions + 1) * SAMPLES_PER_FRAME * MOTION_RATIO * dt
         due_motion[-1] = due_current[-1]
         n_supply = round(period / self._codec.messages["Supply"].period)
         due_supply = np.arange(n_supply) * period / max(n_supply, 1)
-        bounds = {
-            "cycle": cycle.number,
-            "first_current": self._next_sequence("PhaseCurrents", number),
-            "first_motion": self._next_sequence("Motion", number),
-            "n_samples": n_times,
-            "period": dt,
-            "motion_kind": _CHIRP,
-        }
         currents = {f"i_{phase}": _in_tens(response.i[lane, j]) for j, phase in enumerate("abc")}
         motion = {
             "theta_u": _in_tens(response.theta_u[lane, slow]),
@@ -81,10 +70,10 @@ class Traffic:
         u_dc = np.interp(due_supply, cycle.t, response.u_dc[lane])
         encode = self._codec.encode
         return [
-            (encode("CycleStart", number, bounds), np.array([begin])),
+            (encode("CycleStart", number, span._asdict()), np.array([begin])),
             (encode("PhaseCurrents", number, currents), due_current),
             (encode("Motion", number, motion), due_motion),
-            (encode("CycleEnd", number, bounds), due_current[-1:]),
+            (encode("CycleEnd", number, span._asdict()), due_current[-1:]),
             (encode("Supply", number, {"u_dc": u_dc, "temp_w": cycle.temp_w[lane]}), due_supply),
         ]
 
@@ -94,4 +83,4 @@ class Traffic:
 
 def _in_tens(x: np.ndarray) -> np.ndarray:
     """Samples as rows of ten, the last row filled up with zeros."""
-    return np.pad(x, (0, -x.size % _PER_FRAME)).reshape(-1, _PER_FRAME)
+    return np.pad(x, (0, -x.size % SAMPLES_PER_FRAME)).reshape(-1, SAMPLES_PER_FRAME)

@@ -110,6 +110,13 @@ class Codec:
         """Message of an identifier, of any actuator; None when it is foreign."""
         return self._by_id.get(identifiers.message_id(frame_id))
 
+    def number(self, message: str, signal: str, name: str) -> int:
+        """What stands for `name` in the DBC's table of a signal's values."""
+        for number, known in self.messages[message].fields[signal].names.items():
+            if known == name:
+                return number
+        raise BusError(f"{self.path}: signal {message}.{signal} has no value '{name}'")
+
     def filters(self, sender: str) -> list[tuple[int, int]]:
         """Filters for `open_bus` that let through what this node of the DBC sends, for any actuator."""
         return [(m.frame_id, identifiers.MESSAGE_MASK) for m in self.messages.values() if m.sender == sender]

@@ -11,20 +11,20 @@ from ema.bus import identifiers
 from ema.bus.codec import Codec
 from ema.bus.header import sequence
 from ema.bus.protection import Receiver
+from ema.bus.span import Span
 from ema.bus.stream import GOOD, Check
 from ema.core import frames as fr
 from ema.core.frames import FrameFlag, is_overflow
 from ema.models.actuator import Actuator
 
 from .assembly import Assembly, Due
-from .cycles import AssembledCycle, Span
+from .cycles import AssembledCycle
 from .outputs import Event, Level
 from .settings import MonitorSettings
 
 _ERROR, _TX = int(FrameFlag.ERROR), int(FrameFlag.TX)
 RECEIVED = ("CycleStart", "CycleEnd", "PhaseCurrents", "Motion", "Supply")
 _MANY = 512  # frames that wait at most
-_CHIRP = 0  # motion_kind in the DBC
 
 
 class _Batch(NamedTuple):
@@ -66,6 +66,7 @@ class Assembler:
         self._plants = plants
         self._waiting: list[_Batch] = []
         self._n_waiting = 0
+        self._chirp = codec.number("CycleStart", "motion_kind", "chirp")
         ids = {name: codec.messages[name].frame_id for name in RECEIVED}
         self._start, self._end, self._currents, self._motion, _ = ids.values()
         timeout_ns, grace_ns = round(settings.timeout * 1e9), round(settings.grace * 1e9)
@@ -183,7 +184,7 @@ class Assembler:
         span = Span(**{name: values[name][0].item() for name in Span._fields})
         t_ns, number = int(mark.t_ns[0]), int(mark.actuator[0])
         assembly = self._assemblies[number]
-        odd = _misfit(span, self._plants[number])
+        odd = _misfit(span, self._plants[number], self._chirp)
         if odd:
             if assembly.closed != span.cycle:
                 yield Event(t_ns, Level.WARNING, "other_motion", f"cycle {span.cycle} is not looked at: {odd}", number)
@@ -204,11 +205,11 @@ class Assembler:
         yield cycle
 
 
-def _misfit(span: Span, plant: Actuator) -> str:
+def _misfit(span: Span, plant: Actuator, chirp: int) -> str:
     """What of a cycle is not the plant's test motion; empty if it is."""
     period = 1.0 / plant.control.rate
-    if span.motion_kind != _CHIRP:
-        return f"its motion is of kind {span.motion_kind}, the bundle's is a chirp ({_CHIRP})"
+    if span.motion_kind != chirp:
+        return f"its motion is of kind {span.motion_kind}, the bundle's is a chirp ({chirp})"
     if span.n_samples != plant.n_samples:
         return f"it has {span.n_samples} samples, the bundle's has {plant.n_samples}"
     if abs(span.period - period) > 1e-6 * period:

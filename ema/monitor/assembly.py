@@ -12,10 +12,11 @@ import numpy as np
 
 from ema.bus.codec import Codec
 from ema.bus.header import N_SEQUENCES
+from ema.bus.span import SAMPLES_PER_FRAME, Span
 from ema.bus.stream import GOOD, Check
 from ema.core.status import Reason
 
-from .cycles import SAMPLES_PER_FRAME, AssembledCycle, Span, Tally
+from .cycles import AssembledCycle, Tally
 from .track import Track
 
 NEVER = np.iinfo(np.int64).max

@@ -1,4 +1,4 @@
-"""What a test cycle is on the bus, and what the assembly makes of one."""
+"""What the assembly makes of a test cycle."""
 
 from __future__ import annotations
 
@@ -7,41 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ema.bus.span import Span
 from ema.core.status import Reason
-
-SAMPLES_PER_FRAME = 10
-MOTION_RATIO = 10  # current samples to one motion sample
-
-
-class Span(NamedTuple):
-    """What CycleStart and CycleEnd say: which frames are the cycle's."""
-
-    cycle: int
-    first_current: int
-    first_motion: int
-    n_samples: int
-    period: float
-    motion_kind: int
-
-    @property
-    def n_currents(self) -> int:
-        """Frames of PhaseCurrents in the cycle."""
-        return -(-self.n_samples // SAMPLES_PER_FRAME)
-
-    @property
-    def n_motion_samples(self) -> int:
-        """Samples of position and command in the cycle."""
-        return -(-self.n_samples // MOTION_RATIO)
-
-    @property
-    def n_motions(self) -> int:
-        """Frames of Motion in the cycle."""
-        return -(-self.n_motion_samples // SAMPLES_PER_FRAME)
-
-    @property
-    def last_current(self) -> int:
-        """Sequence number of the last frame of PhaseCurrents, not yet wrapped."""
-        return self.first_current + self.n_currents - 1
 
 
 class Tally(NamedTuple):

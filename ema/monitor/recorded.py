@@ -15,6 +15,7 @@ import numpy as np
 from ema.bus import codec as codecs
 from ema.bus import identifiers
 from ema.bus.codec import Codec
+from ema.bus.span import MOTION_RATIO
 from ema.core.config import validate
 from ema.core.errors import NoCycleError, RecordError
 from ema.core.records import Cycle, Record
@@ -23,7 +24,7 @@ from ema.models.actuator import Actuator
 from ema.models.turns import nearest_turn
 
 from .assembler import Assembler
-from .cycles import MOTION_RATIO, AssembledCycle
+from .cycles import AssembledCycle
 from .settings import MonitorSettings
 
 _SUPPLY = ("u_dc", "temp_w")

@@ -48,6 +48,12 @@ def test_what_is_encoded_is_decoded(codec, name):
         assert np.array_equal(array, values[key])
 
 
+def test_a_value_has_the_number_that_the_dbc_gives_it(codec):
+    assert codec.number("EstimateNuisance", "method", "hf") == 2
+    with pytest.raises(BusError, match=r"ema\.dbc: signal CycleStart\.motion_kind has no value 'sine'"):
+        codec.number("CycleStart", "motion_kind", "sine")
+
+
 def test_out_of_range_is_clipped_as_a_converter_does(codec):
     frames = codec.encode("Supply", 0, {"u_dc": [-1.0, 1e9], "temp_w": [-1e9, 1e9]})
     values = codec.messages["Supply"].decode(frames)

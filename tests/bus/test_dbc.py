@@ -9,6 +9,7 @@ import pytest
 
 from ema.bus import identifiers
 from ema.bus.header import HEADER_SIGNALS
+from ema.bus.span import SAMPLES_PER_FRAME, Span
 from ema.core import resources
 from ema.core.status import LogState, Reason, ServiceState, Status
 from ema.effects import registry
@@ -71,6 +72,16 @@ def test_heartbeat_states_are_those_of_the_library(database):
     heartbeat = database.get_message_by_name("Heartbeat")
     assert choices(heartbeat, "state") == meaning(ServiceState)
     assert choices(heartbeat, "log_state") == meaning(LogState)
+
+
+def test_a_cycle_has_the_layout_that_its_span_counts_with(database):
+    for name in ("CycleStart", "CycleEnd"):
+        message = database.get_message_by_name(name)
+        assert {s.name for s in message.signals} - set(HEADER_SIGNALS) == set(Span._fields)
+        assert choices(message, "motion_kind") == {0: "chirp"}
+    for name, series in {"PhaseCurrents": "i_a i_b i_c", "Motion": "theta_u theta_m theta_cmd"}.items():
+        signals = {s.name for s in database.get_message_by_name(name).signals} - set(HEADER_SIGNALS)
+        assert signals == {f"{stem}_{n}" for stem in series.split() for n in range(SAMPLES_PER_FRAME)}
 
 
 def test_every_parameter_of_an_effect_has_a_number_and_units_are_si(database):
