@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import click
@@ -19,8 +18,6 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
     Example:
       ema daemon --config config/daemon.yaml --bus vcan0
     """
-    # Thirty equations: threads of the linear algebra would only fight for the cores. Read when numpy is imported.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     import logging
 
     from ema.bus import interface

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import click
@@ -23,7 +22,6 @@ def demo(out: Path, bus: str, n_cycles: int | None) -> None:
     Example:
       ema demo --out ema-demo
     """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the daemon
     from rich.console import Console
 
     from . import chain, plot, results, stage

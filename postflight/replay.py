@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -53,7 +52,6 @@ def replay(
       ema replay /var/log/ema --identify
       ema replay flight.mcap --identify --bundle new-bundle --cycles comparison.csv
     """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: on thirty equations threads only spin
     from .open_log import open_log
 
     if bool(onto) == identify:

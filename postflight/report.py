@@ -29,9 +29,6 @@ def report(logs: tuple[Path, ...], out: Path, config_path: Path | None, start: T
       ema report /var/log/ema --out flight.html
       ema report flight.mcap --out flight.html --config thresholds.yaml --start 60 --end 600
     """
-    import os
-
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: on small matrices threads only spin
     from ema.core import config
 
     from .open_log import open_mcap

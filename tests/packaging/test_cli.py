@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from importlib.metadata import entry_points
@@ -27,6 +28,15 @@ def test_help_lists_every_subcommand():
 
 def test_the_version_is_that_of_logs():
     assert CliRunner().invoke(cli, ["--version"]).output == f"ema {version()}\n"
+
+
+@pytest.mark.parametrize("chosen", [None, "4"])
+def test_every_command_finds_the_linear_algebra_without_threads_unless_they_are_asked_for(chosen):
+    name = "OPENBLAS_NUM_THREADS"
+    environment = {key: value for key, value in os.environ.items() if key != name} | ({name: chosen} if chosen else {})
+    program = f"import os, sys, ema.cli; print('numpy' in sys.modules, os.environ['{name}'])"
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", chosen or "1"]  # it is read when numpy is imported
 
 
 @pytest.mark.parametrize("name", COMMANDS)
