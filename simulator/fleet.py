@@ -8,12 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ema.effects import registry
+from ema.effects.base import T_REFERENCE
 from ema.models import hf
 from ema.models.actuator import Actuator
 
 from .scenario import Scenario
-
-_T_REFERENCE = 20.0  # °C, to which the plant's numbers belong
 
 
 class CycleData(NamedTuple):
@@ -70,7 +69,7 @@ class Fleet:
             start=self._state,
             seeds=np.array(seeds),
             effects=self._effects,
-            dT=temp_w - _T_REFERENCE,
+            dT=temp_w - T_REFERENCE,
             noise=scenario.noise,
         )
         self._state = response.state

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ema.core.names import CURRENTS
 from ema.core.records import Cycle
 
 from .fleet import CycleData
@@ -16,7 +17,7 @@ def to_cycle(data: CycleData, lane: int) -> Cycle:
         data.number,
         {
             "t": data.t,
-            **{f"i_{phase}": r.i[lane, j] for j, phase in enumerate("abc")},
+            **dict(zip(CURRENTS, r.i[lane], strict=True)),
             "theta_m": r.theta_m[lane],
             "theta_u": r.theta_u[lane],
             "theta_cmd": data.theta_cmd,

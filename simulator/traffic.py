@@ -10,6 +10,7 @@ from ema.bus.codec import Codec
 from ema.bus.identifiers import with_actuator
 from ema.bus.protection import Sender
 from ema.bus.span import MOTION_RATIO, SAMPLES_PER_FRAME, Span
+from ema.core.names import CURRENTS
 
 from .fleet import CycleData
 
@@ -61,7 +62,7 @@ class Traffic:
         due_motion[-1] = due_current[-1]
         n_supply = round(period / self._codec.messages["Supply"].period)
         due_supply = np.arange(n_supply) * period / max(n_supply, 1)
-        currents = {f"i_{phase}": _in_tens(response.i[lane, j]) for j, phase in enumerate("abc")}
+        currents = {name: _in_tens(i) for name, i in zip(CURRENTS, response.i[lane], strict=True)}
         motion = {
             "theta_u": _in_tens(response.theta_u[lane, slow]),
             "theta_m": _in_tens(response.theta_m[lane, slow] % (2 * np.pi)),

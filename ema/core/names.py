@@ -17,6 +17,7 @@ FAULT_MEANING = {
     "k6": "eccentricity",
 }
 PHASES = ("a", "b", "c")
+CURRENTS = ("i_a", "i_b", "i_c")
 
 
 class Channel(NamedTuple):

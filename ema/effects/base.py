@@ -19,8 +19,9 @@ angle_error           θ_m [rad]                                                
 position_error        θ_m [rad]                                                  sum, on the angle only  0 rad
 ====================  =========================================================  ======================  ========
 
-ΔT is the winding temperature less 20 °C. The speed of a resolver has the slope of its angle's error; an error on the angle only
-leaves a speed from another sensor as it is. A tabulated torque is a shaft torque that costs a fifth of a step.
+ΔT is the winding temperature less `T_REFERENCE`. The speed of a resolver has the slope of its angle's error; an error
+on the angle only leaves a speed from another sensor as it is. A tabulated torque is a shaft torque that costs a fifth
+of a step.
 A kernel is compiled with those parts of the library only that its runs need (`ema.models.parts`). An effect without
 laws is *structural*: the model itself reads its parameters (a delay, a dead time, a second inertia).
 """
@@ -47,6 +48,7 @@ HOOKS = MappingProxyType(
 )
 
 
+T_REFERENCE = 20.0  # [°C] winding temperature that a plant's numbers belong to
 ABSENT = -1.0  # as the low end of a relative change: nothing is left, which is credible
 
 

@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ema.core.errors import RecordError
+from ema.core.names import CURRENTS
 from ema.core.records import Cycle, Record
 from ema.models.actuator import Actuator
 
-CURRENTS = ("i_a", "i_b", "i_c")
 FOLLOWS = 0.7  # coherence from which the currents say where the rotor's zero is
 SIXTH = np.pi / 3.0  # electrical; by so much the phases' names and signs turn a three-phase motor into itself
 MAX_REST = 0.25  # [rad] electrical, beyond what resolvers are out of adjustment and the method errs (0.12 rad)

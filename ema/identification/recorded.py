@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ema.core.errors import RecordError
+from ema.core.names import CURRENTS
 from ema.core.records import Cycle, Record, require
 from ema.models.actuator import Actuator
 
 from .measurement import Measurement
 from .sampling import Sampler
 
-CURRENTS = ("i_a", "i_b", "i_c")
 START = ("theta_u", "theta_m")
 MAX_CUT_OFF = 5e-3  # [s] by which a recorder may end early; what the envelope's low-pass makes of it is left out
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from numba import njit
 
+from ema.core.names import CURRENTS, PHASES
 from ema.effects.backlash import deflection, follow
 from ema.effects.dry_friction import speed_after
 from ema.effects.inverter import comparator, leg_voltage, share_of_step
@@ -21,14 +22,14 @@ from . import hooks, jit
 from .layout import row
 from .parts import FRICTION, GEAR, INVERTER, MOTOR, SENSORS, TABLES, TORQUE
 
-I_A, I_B, I_C, S_A, S_B, S_C = (row(f"{x}_{j}") for x in "is" for j in "abc")
-OFF_A, OFF_B, OFF_C = (row(f"off_{j}") for j in "abc")
-LAG1_A, LAG1_B, LAG1_C, LAG2_A, LAG2_B, LAG2_C = (row(f"lag{n}_{j}") for n in "12" for j in "abc")
+I_A, I_B, I_C, S_A, S_B, S_C = (row(f"{x}_{j}") for x in "is" for j in PHASES)
+OFF_A, OFF_B, OFF_C = (row(f"off_{j}") for j in PHASES)
+LAG1_A, LAG1_B, LAG1_C, LAG2_A, LAG2_B, LAG2_C = (row(f"lag{n}_{j}") for n in "12" for j in PHASES)
 THETA_M, W_M, THETA_U, W_U, U_DC, ANGLE_ERROR, I_REF = map(
     row, ("theta_m", "w_m", "theta_u", "w_u", "u_dc", "angle_error", "I_ref")
 )
 THETA_0 = row("theta_0")
-R_A, R_B, R_C, L_A, L_B, L_C, K_A, K_B, K_C = (row(f"{x}_{j}") for x in "RLk" for j in "abc")
+R_A, R_B, R_C, L_A, L_B, L_C, K_A, K_B, K_C = (row(f"{x}_{j}") for x in "RLk" for j in PHASES)
 P, ZETA, PHI, V_DC, H, I_MAX, J_M, C, F_S, F_D, GR, B, THETA_STOP = map(
     row, ("p", "zeta", "phi", "V_dc", "h", "I_max", "J_m", "C", "F_s", "F_d", "GR", "b", "theta_stop")
 )
@@ -40,11 +41,11 @@ COMPLIANCE, INERTIA, DAMPING = (row(f"gear_compliance.{x}") for x in ("complianc
 SOURCE_R, SOURCE_C = row("supply_sag.resistance"), row("supply_sag.capacitance")
 DEAD_TIME, DELAY = row("dead_time.time"), row("comparator_delay.time")
 COMMUTATION, APART = map(row, ("commutation_offset.angle", "commutation_offset.apart"))
-GAIN_A, GAIN_B, GAIN_C = (row(f"current_gain.gain_{j}") for j in "abc")
-OFFSET_A, OFFSET_B, OFFSET_C = (row(f"current_offset.offset_{j}") for j in "abc")
+GAIN_A, GAIN_B, GAIN_C = (row(f"current_gain.gain_{j}") for j in PHASES)
+OFFSET_A, OFFSET_B, OFFSET_C = (row(f"current_offset.offset_{j}") for j in PHASES)
 
 # Where the record's channels stand in the output array.
-OUTPUTS = ("i_a", "i_b", "i_c", "theta_m", "theta_u", "w_m", "u_dc", "I_ref")
+OUTPUTS = (*CURRENTS, "theta_m", "theta_u", "w_m", "u_dc", "I_ref")
 THIRD = TWO_PI / 3.0
 COS_THIRD, SIN_THIRD = -0.5, 0.75**0.5
 

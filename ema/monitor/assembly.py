@@ -14,6 +14,7 @@ from ema.bus.codec import Codec
 from ema.bus.header import N_SEQUENCES
 from ema.bus.span import SAMPLES_PER_FRAME, Span
 from ema.bus.stream import GOOD, Check
+from ema.core.names import CURRENTS
 from ema.core.status import Reason
 
 from .cycles import AssembledCycle, Tally
@@ -166,7 +167,7 @@ class Assembly:
             t_ns=t_ns,
             actuator=self.actuator,
             span=span,
-            i=np.stack([i[f"i_{phase}"].ravel()[: span.n_samples] for phase in "abc"]),
+            i=np.stack([i[name].ravel()[: span.n_samples] for name in CURRENTS]),
             missing=np.repeat(~present, SAMPLES_PER_FRAME)[: span.n_samples],
             motion=self._motion(span),
             tally=tally,
