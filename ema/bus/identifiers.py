@@ -57,12 +57,6 @@ def parse(frame_id: int) -> Identifier:
     )
 
 
-def compose(fields: Identifier) -> int:
-    """29-bit identifier of the fields; the inverse of `parse`."""
-    lcc, fid, lcl, pvt, doc, rci = fields
-    return lcc << 26 | fid << 19 | lcl << 17 | pvt << 16 | doc << 2 | rci
-
-
 def message_id(frame_id: Id) -> Id:
     """Identifier of the DBC message, that is, of its actuator 0. For an int or an array."""
     return frame_id & MESSAGE_MASK

@@ -188,8 +188,6 @@ STATUS = Kind(
     },
 )
 
-KINDS = (FRAMES, ESTIMATE, NUISANCE, ENVELOPE, EVENT, STATUS)
-
 
 def to_json(content: dict[str, Any]) -> bytes:
     """JSON of a message; numpy values become lists and numbers, NaN becomes null, floats keep every bit."""

@@ -8,6 +8,7 @@ import pytest
 from ema.core import resources
 from ema.log import schemas
 
+KINDS = [kind for kind in vars(schemas).values() if isinstance(kind, schemas.Kind)]
 LAYOUT = json.loads(resources.config("foxglove-layout.json").read_text())
 
 
@@ -21,7 +22,7 @@ def _paths():
 @pytest.mark.parametrize("path", sorted(_paths()))
 def test_every_path_is_a_field_of_a_channel(path):
     topic, _, names = path.partition(".")
-    (kind,) = [kind for kind in schemas.KINDS if re.fullmatch(re.sub(r"\{\w+\}", r"\\w+", kind.topic), topic)]
+    (kind,) = [kind for kind in KINDS if re.fullmatch(re.sub(r"\{\w+\}", r"\\w+", kind.topic), topic)]
     if names:
         name, index = re.fullmatch(r"(\w+)(?:\[(\d+)\])?(?:\.\w+)?", names).groups()
         field = kind.fields[name]
