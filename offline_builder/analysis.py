@@ -80,7 +80,7 @@ def analyse(
     modes = pod(envelopes.part(plan.groups["campaign"]), i0, seed=builder.seed)
 
     say(f"schedule ({builder.schedule.method})")
-    know = Knowledge(plant.time(), modes.v[:, 0], A_full, (nominal - i0).T @ (nominal - i0) / (len(nominal) - 1))
+    know = Knowledge(plant.time(), modes.v[:, 0], A_full, nominal)
     points = schedule(builder.schedule.method, know, builder.schedule.n_points, builder.seed)
 
     say("LF2 library")
