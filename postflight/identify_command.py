@@ -8,7 +8,8 @@ from typing import Any
 
 import click
 
-METHODS = ("linear", "lf2", "lf1", "hf")
+from ema.core.names import METHODS
+
 LEVELS = (0.5, 0.9, 0.95)
 
 

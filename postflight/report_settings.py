@@ -5,13 +5,12 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ema.core.config import Settings
 from ema.core.names import FAULTS
 from ema.core.units import quantity
-
-Method = Literal["linear", "lf2", "hf"]
+from ema.log.schemas import METHODS
 
 
 class Severity(IntEnum):
@@ -45,12 +44,20 @@ class Thresholds(Settings):
 class ReportSettings(Settings):
     """The whole configuration of the report."""
 
-    methods: list[Method] = Field(default=["hf", "lf2", "linear"], min_length=1)
+    methods: list[str] = Field(default=["hf", "lf2", "linear"], min_length=1)
     recent: float = quantity("s", "age of the oldest estimate taken for the health", 60.0, gt=0)
     longest_gap: float = quantity("s", "a longer silence is a break, not time of operation", 60.0, gt=0)
     persistence: int = Field(default=3, ge=1, le=1000, description="estimates in a row that change the severity")
     severity: dict[str, Thresholds] = Field(description="by fault")
     life_until: Literal["watch", "warning", "alarm"] = "alarm"
+
+    @field_validator("methods")
+    @classmethod
+    def _in_logs(cls, methods: list[str]) -> list[str]:
+        odd = sorted(set(methods) - set(METHODS))
+        if odd:
+            raise ValueError(f"identifier '{odd[0]}' is not in logs; {', '.join(METHODS)} are")
+        return methods
 
     @model_validator(mode="after")
     def _every_fault(self) -> ReportSettings:

@@ -18,6 +18,7 @@ FAULT_MEANING = {
 }
 PHASES = ("a", "b", "c")
 CURRENTS = ("i_a", "i_b", "i_c")
+METHODS = ("linear", "lf2", "lf1", "hf")  # identifiers, each a module of `ema.identification`
 
 
 class Channel(NamedTuple):

@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Protocol
 
 from ema.core.errors import ConfigError
+from ema.core.names import METHODS
 
 from .estimate import Estimate
 from .measurement import Measurement
@@ -19,14 +20,6 @@ if TYPE_CHECKING:
     from ema.bundle import Bundle
 
 __all__ = ["METHODS", "Estimate", "Identifier", "Measurement", "NuisanceEstimate", "identifier"]
-
-# Where each identifier is made, by a function `make(bundle)`; imported on demand, since some need a JIT.
-METHODS = {
-    "linear": "ema.identification.linear",
-    "lf2": "ema.identification.lf2",
-    "lf1": "ema.identification.lf1",
-    "hf": "ema.identification.hf",
-}
 
 
 class Identifier(Protocol):
@@ -41,5 +34,5 @@ def identifier(name: str, bundle: Bundle) -> Identifier:
     """The identifier `name` on a bundle."""
     if name not in METHODS:
         raise ConfigError(f"identifier '{name}' is unknown; known: {', '.join(METHODS)}")
-    made: Identifier = import_module(METHODS[name]).make(bundle)
+    made: Identifier = import_module(f"{__name__}.{name}").make(bundle)  # on demand, since some need a JIT
     return made

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from ema.core.names import FAULTS
 from ema.core.status import LogState, Reason, ServiceState, Status
 
-METHODS = ("linear", "lf2", "hf")
+METHODS = ("linear", "lf2", "hf")  # identifiers that the daemon runs
 ACTUATORS = 64
 
 Schema = dict[str, Any]

@@ -11,8 +11,10 @@ from ema.bus import identifiers
 from ema.bus.header import HEADER_SIGNALS
 from ema.bus.span import SAMPLES_PER_FRAME, Span
 from ema.core import resources
+from ema.core.names import METHODS
 from ema.core.status import LogState, Reason, ServiceState, Status
 from ema.effects import registry
+from ema.log import schemas
 
 
 @pytest.fixture(scope="module")
@@ -92,9 +94,15 @@ def test_every_parameter_of_an_effect_has_a_number_and_units_are_si(database):
     assert sorted(listed) == sorted(known)
 
 
+def test_every_identifier_has_a_number(database):
+    listed = choices(database.get_message_by_name("EstimateNuisance"), "method").values()
+    assert sorted(listed) == sorted(METHODS)
+    assert set(schemas.METHODS) <= set(METHODS)
+
+
 def test_status_and_reasons_are_those_of_the_library(database):
-    for name in ("EstimateLinear", "EstimateLf2", "EstimateHf"):
-        message = database.get_message_by_name(name)
+    for method in schemas.METHODS:
+        message = database.get_message_by_name(f"Estimate{method.capitalize()}")
         assert choices(message, "status") == meaning(Status)
         listed = message.get_signal_by_name("reason").comment.split(": ")[1].rstrip(".")
         assert listed.split(", ") == [reason.name for reason in Reason]

@@ -134,6 +134,7 @@ def test_thresholds_come_from_the_configuration(flight, tmp_path):
         ({"severity": {}}, "severity must name k1"),
         ({"persistence": 0}, "persistence"),
         ({"colour": "red"}, "'colour' is unknown"),
+        ({"methods": ["hf", "lf1"]}, r"r\.yaml: key 'methods' .*identifier 'lf1' is not in logs; linear, lf2, hf are"),
     ],
 )
 def test_a_wrong_configuration_is_refused(flight, tmp_path, change, message):

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ema_offline_builder.config import Schedule
 
 from ema.core.errors import ConfigError
 from ema.reduction.schedules import SCHEDULES, Knowledge, schedule
@@ -26,6 +27,11 @@ def test_contract(know, name, n):
     assert index[0] >= 0
     assert index[-1] < len(know.t)
     assert np.array_equal(index, schedule(name, know, n, seed=1))
+
+
+@pytest.mark.parametrize("name", SCHEDULES)
+def test_a_builder_can_ask_for_every_schedule(name):
+    assert Schedule(method=name).method == name
 
 
 def information(know, index):
