@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from ema_daemon.settings import load
 
 from ema.core import resources
 
@@ -43,6 +44,23 @@ def test_unit_is_understood(unit, tmp_path):
     answer = subprocess.run(["systemd-analyze", "verify", instance], capture_output=True, text=True, check=False).stderr
     complaints = [line for line in answer.splitlines() if instance.name in line]
     assert [line for line in complaints if not any(key in line for key in NEWER_THAN_DEBIAN_12)] == []
+
+
+def test_documented_steps_make_a_configuration_whose_files_are_there(tmp_path):
+    text = (ROOT / "docs/service.md").read_text()
+    steps = [line.strip() for line in text.splitlines() if line.startswith(("    cp ", "    sed "))]
+    assert len(steps) == 2
+    (tmp_path / "bundle").mkdir()
+    (tmp_path / "config").symlink_to(ROOT / "config")
+    etc = tmp_path / "etc"
+    etc.mkdir()
+    script = "\n".join(steps).replace("/etc/ema", str(etc))
+    subprocess.run(["sh", "-euc", script], cwd=tmp_path, check=True)
+    settings = load(etc / "vcan0.yaml")
+    assert Path(settings.actuators[0].bundle) == etc / "bundle"
+    assert Path(settings.actuators[0].bundle).is_dir()
+    assert Path(settings.actuators[0].plant).is_file()
+    assert settings.log.directory == "/var/log/ema/vcan0"
 
 
 @pytest.mark.slow
