@@ -157,8 +157,9 @@ class Service:
 
     def _finish(self, uptime: float) -> None:
         self._put(self._monitor.finish())
+        deadline = time.monotonic() + _PATIENCE
         for worker in self._workers.values():
-            self._conclude(worker.close(_PATIENCE))
+            self._conclude(worker.close(deadline))
         self._health.look(time.time_ns())
         self._health.state = ServiceState.STOPPING
         self._send_beat(uptime, time.time_ns())

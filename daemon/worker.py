@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import queue
 import threading
+import time
 from collections.abc import Callable
 
 from ema.identification import Estimate
@@ -57,13 +58,13 @@ class Worker:
         """Whether every job has been answered, and every answer taken."""
         return self._n_pending == 0
 
-    def close(self, timeout: float) -> list[Answer]:
-        """Finish the queued jobs if they take no longer than `timeout` [s]; their answers."""
+    def close(self, deadline: float) -> list[Answer]:
+        """Finish the queued jobs if they are done by `deadline`, of `time.monotonic` [s]; their answers."""
         try:
-            self._jobs.put(None, timeout=timeout)
+            self._jobs.put(None, timeout=_until(deadline))
         except queue.Full:
             return self.answers()
-        self._thread.join(timeout)
+        self._thread.join(_until(deadline))
         return self.answers()
 
     def _run(self) -> None:
@@ -72,3 +73,7 @@ class Worker:
                 self._answers.put((job, self._run_job(job)))
             except Exception as error:  # a defect in an identifier must not stop the monitor
                 self._answers.put((job, error))
+
+
+def _until(deadline: float) -> float:
+    return max(0.0, deadline - time.monotonic())
