@@ -130,7 +130,7 @@ def rows(count: int = 600, n_peer: int = 120) -> list[dict[str, Any]]:
     try:
         from . import _progpy
     except ImportError:
-        return [*found, _row("prognosis beside ProgPy: needs pip install 'ema-monitor[peers]'", np.nan, None, "")]
+        return [*found, _row("prognosis beside ProgPy: needs pip install 'ema-monitor[bench-peers]'", np.nan, None, "")]
     own, peer = scores(n_peer), scores(n_peer, _progpy.prognosis)
     return found + [
         _row(f"prognosis, {n_peer} of them: {figure.strip()}", *own[figure])
