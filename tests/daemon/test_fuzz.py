@@ -1,37 +1,63 @@
 """Arbitrary configurations, and noise on the bus for a long while: an answer or one line; memory does not grow."""
 
+import copy
+import math
+import operator
+import re
 import tracemalloc
+from functools import partial, reduce
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from ema_daemon import settings as daemon
+from ema_offline_builder.config import Builder
 from ema_simulator import scenario
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ema.bus import codec as codecs
 from ema.bus.authentication import Verifier
+from ema.core import config, resources
 from ema.core import frames as fr
-from ema.core import resources
 from ema.core.errors import ConfigError
+from ema.models.actuator import Actuator
 from ema.monitor import Monitor
 from ema.monitor.settings import MonitorSettings
 
 FUZZ = settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 READERS = [(daemon.load, "daemon.yaml"), (scenario.load, "scenario-bad-bus.yaml")]
+EVERY_READER = [
+    *READERS,
+    (scenario.load, "scenario.yaml"),
+    (partial(config.load, kind=Builder), "builder.yaml"),
+    (partial(config.load, kind=Actuator), "actuator.yaml"),
+]
+ODD = (math.nan, math.inf, -math.inf, 0, -1, 1e300, "", "text", None, True, [], {}, [math.nan], [1], {"a": 1})
+TOO_LONG_FOR = {"return_time": "period"}  # and then refused in that key's name
 LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{new}: &{new} [{', '.join(9 * [f'*{old}'])}]\n" for old, new in zip("abcdefgh", "bcdefghi", strict=True)
 )
 
 
-def refused_in_one_line_or_read(load, path, text):
-    path.write_bytes(text.encode(errors="surrogateescape"))
-    said = ""
+def refusal(load, path):
+    """What is said of a configuration; None if it is read."""
     try:
         load(path)
     except ConfigError as error:
-        said = str(error)
+        return str(error)
+    return None
+
+
+def refused_in_one_line_or_read(load, path, text):
+    path.write_bytes(text.encode(errors="surrogateescape"))
+    said = refusal(load, path)
+    if said is None:
+        return
+    assert said.startswith(str(path))
+    what = said.removeprefix(str(path))
+    assert re.match(r": key '|: must be a mapping|: is not UTF-8|(, line \d+)?: is not valid YAML", what)
     assert "\n" not in said
     assert len(said) < 2000
 
@@ -62,6 +88,39 @@ def test_a_sound_configuration_written_over(tmp_path_factory, load, name, data, 
 @pytest.mark.parametrize("text", [LAUGHS, LAUGHS + "actuators: *i\n", "a: &a [*a]", "[" * 400, "a: " * 3000])
 def test_a_configuration_that_would_blow_up(tmp_path, load, name, text):
     refused_in_one_line_or_read(load, tmp_path / name, text)
+
+
+def places(node, at=()):
+    """Every key and item of a configuration, as a path."""
+    if at:
+        yield at
+    pairs = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for key, value in pairs:
+        yield from places(value, (*at, key))
+
+
+@pytest.mark.parametrize(("load", "name"), EVERY_READER, ids=[name for _, name in EVERY_READER])
+def test_any_value_of_any_key_is_read_or_refused_by_its_name(tmp_path, load, name):
+    sound, path = yaml.safe_load(Path(resources.config(name)).read_text()), tmp_path / name
+    path.write_text(yaml.safe_dump(sound))
+    assert refusal(load, path) is None
+    n_refused = 0
+    for at in places(sound):
+        key = next(part for part in reversed(at) if isinstance(part, str))
+        *way, last = at
+        for odd in ODD:
+            changed = copy.deepcopy(sound)
+            reduce(operator.getitem, way, changed)[last] = odd
+            path.write_text(yaml.safe_dump(changed))
+            said = refusal(load, path)
+            if said is None or (at == ("actuator",) and "cannot be read" in said):  # names the plant's file instead
+                continue
+            n_refused += 1
+            assert "\n" not in said
+            assert said.startswith(f"{path}: "), (at, odd)
+            named = said.removeprefix(str(path))
+            assert key in named or f"key '{TOO_LONG_FOR.get(key)}'" in named, (at, odd, said)
+    assert n_refused > len(list(places(sound)))  # of each key more than one value is wrong
 
 
 @pytest.mark.parametrize("with_key", [False, True])
