@@ -21,6 +21,7 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
     import logging
 
     from ema.bus import interface
+    from ema.core.errors import EmaError, Failure
     from ema.core.stopping import on_stop
 
     from .settings import load
@@ -37,4 +38,7 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
 
     with assembled(settings) as service:
         on_stop(service.stop)
-        service.run()
+        try:
+            service.run()
+        except EmaError as error:  # not of the configuration, which was good enough to start
+            raise Failure(str(error)) from error

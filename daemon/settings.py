@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from ema.bundle import Bundle
 from ema.bundle import load as load_bundle
+from ema.bus import codec
 from ema.bus.interface import BusSettings
 from ema.core import config
 from ema.core.config import Settings
@@ -18,6 +19,8 @@ from ema.identification import METHODS
 from ema.log import LogSettings
 from ema.models.actuator import Actuator
 from ema.monitor import MonitorSettings
+
+from .sinks import estimate_message
 
 LOCAL = ("linear", "lf2")  # identifiers that are small enough for the daemon's own process
 Number = Annotated[int, Field(ge=0, le=63)]
@@ -54,6 +57,17 @@ class DaemonSettings(Settings):
         for method in self.monitor.slower:
             if method in METHODS and method not in LOCAL and method not in self.remote:
                 raise ValueError(f"identifier '{method}' needs a process of its own: remote.{method} is its socket")
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_told(self) -> DaemonSettings:
+        messages = codec.default().messages
+        told = [method for method in METHODS if estimate_message(method) in messages]
+        for method in self.monitor.slower:
+            if method in METHODS and method not in told:
+                raise ValueError(
+                    f"monitor.slower: the DBC has no message for estimates of '{method}', only of {', '.join(told)}"
+                )
         return self
 
 

@@ -20,6 +20,11 @@ _LEVELS = {Level.INFO: logging.INFO, Level.WARNING: logging.WARNING, Level.ERROR
 _NO_LIMIT = 1e9  # clipped by the codec to the largest value, which means "that much or more"
 
 
+def estimate_message(method: str) -> str:
+    """Name of the DBC message that carries an identifier's estimates."""
+    return f"Estimate{method.capitalize()}"
+
+
 class BusSink:
     """Sends estimates and heartbeats."""
 
@@ -40,7 +45,7 @@ class BusSink:
             "p_value": np.nan_to_num(e.p_value, nan=0.0),
             "residual": _NO_LIMIT if residual is None else residual,
         }
-        self._send(f"Estimate{e.method.capitalize()}", out.actuator, values, out.t_ns)
+        self._send(estimate_message(e.method), out.actuator, values, out.t_ns)
         if e.nuisance is not None:
             self._nuisance(out, e.nuisance)
 

@@ -1,6 +1,7 @@
 """The `ema` command. Subcommands are registered by the programs as entry points of the group `ema.commands`.
 
-Exit status: 0 done; 1 a negative answer or a failed check; 2 wrong use or bad input, told in one line.
+Exit status: 0 done; 1 a negative answer, a failed check, or a service that cannot go on; 2 wrong use or bad input, told
+in one line.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any, NoReturn
 
 import click
 
-from ema.core.errors import EmaError, NegativeAnswer
+from ema.core.errors import EmaError, Failure, NegativeAnswer
 from ema.core.version import version
 
 # Before numpy is loaded: matrices here are small, and threads of a linear algebra library that wait for each other cost
@@ -69,7 +70,7 @@ def main() -> NoReturn:
             click.echo(error.format_message())
             sys.exit(2)
         _fail(f"{error.format_message()} (see '{name} --help')", 2)
-    except NegativeAnswer as error:
+    except (NegativeAnswer, Failure) as error:
         _fail(str(error), 1)
     except EmaError as error:
         _fail(str(error), 2)

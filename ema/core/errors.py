@@ -37,5 +37,9 @@ class LogError(EmaError):
     """A log cannot be written or read."""
 
 
+class Failure(EmaError):
+    """What ran well cannot go on: exit status 1, so that a service manager starts it again."""
+
+
 class NegativeAnswer(EmaError):
     """The command ran and its answer is no (a failed check or comparison): exit status 1."""

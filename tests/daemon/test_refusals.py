@@ -45,6 +45,7 @@ def test_a_good_configuration_is_not_refused(write_config):
         ({"pace": "3 V"}, "wrong unit"),
         ({"monitor": {"slower": {"lf2": {"every": 0}}}}, "greater than or equal to 0.01"),
         ({"monitor": {"slower": {"magic": {"every": 1}}}}, "identifier 'magic' is unknown"),
+        ({"monitor": {"slower": {"lf1": {"every": 5}}}, "remote": {"lf1": "lf1.sock"}}, "no message for .* 'lf1'"),
         ({"monitor": {"model_check": {"cycles": 2, "failures": 3}}}, "can never happen"),
     ],
 )
@@ -117,6 +118,25 @@ def test_the_user_sees_one_line(write_config, tmp_path):
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith("ema: ")
     assert not list((tmp_path / "log").iterdir())
+
+
+def test_what_fails_later_is_not_taken_for_a_bad_configuration(write_config):
+    """Exit status 1: after 2 the service manager does not start it again."""
+    code = f"""
+import sys
+from ema_daemon.service import Service
+from ema.cli import main
+from ema.core.errors import BusError
+
+def run(self):
+    raise BusError("vcan0: gone")
+
+Service.run = run
+sys.argv[1:] = ["daemon", "--config", "{write_config()}"]
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (1, "ema: vcan0: gone\n")
 
 
 def test_the_process_stays_small():
