@@ -119,11 +119,12 @@ class Bundle:
 
 
 def save(path: Path, plant: Actuator, builder: dict[str, Any], arrays: dict[str, np.ndarray], **facts: Any) -> Bundle:
-    """Write a bundle whole or not at all; refuses to replace anything that is not a bundle."""
+    """Write a bundle whole and fit to be loaded, or not at all; refuses to replace anything that is not a bundle."""
     path = Path(path)
+    home = path.resolve()
     if path.exists() and not (path / "manifest.json").exists() and (not path.is_dir() or any(path.iterdir())):
         raise BundleError(f"{path}: exists and is not a bundle; choose another --out or remove it")
-    scratch = path.with_name(path.name + ".unfinished")
+    scratch = home.with_name(home.name + ".unfinished")
     shutil.rmtree(scratch, ignore_errors=True)
     try:
         scratch.mkdir(parents=True)
@@ -143,12 +144,24 @@ def save(path: Path, plant: Actuator, builder: dict[str, Any], arrays: dict[str,
         (scratch / "manifest.json").write_text(
             json.dumps(manifest, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
         )
-        if path.exists():
-            shutil.rmtree(path)
-        os.replace(scratch, path)
+        load(scratch)
+        _put(scratch, home)
     except OSError as error:
         raise BundleError(f"{path}: cannot be written ({error.strerror})") from error
+    except BundleError as error:
+        shutil.rmtree(scratch)
+        raise BundleError(f"{path}: is not written, for it could not be used: {error}") from error
     return Bundle(path, manifest, arrays)
+
+
+def _put(new: Path, home: Path) -> None:
+    """Move a folder to where another may be; at no moment is there neither of them."""
+    aside = home.with_name(home.name + ".replaced")
+    if home.exists():
+        shutil.rmtree(aside, ignore_errors=True)
+        os.replace(home, aside)
+    os.replace(new, home)
+    shutil.rmtree(aside, ignore_errors=True)
 
 
 def load(path: str | Path) -> Bundle:

@@ -63,6 +63,38 @@ def test_a_folder_that_is_no_bundle_is_not_overwritten(small_bundle, tmp_path):
     assert (tmp_path / "precious.txt").read_text() == "mine"
 
 
+def test_a_bundle_that_could_not_be_loaded_does_not_replace_one(small_bundle):
+    broken = small_bundle.arrays | {"A": np.full_like(small_bundle.A, np.nan)}
+    with pytest.raises(EmaError, match=r"bundle: is not written.*A\.npy: holds numbers that are not finite") as error:
+        bundle.save(small_bundle.path, small_bundle.plant, {}, broken)
+    assert "\n" not in str(error.value)
+    assert np.array_equal(bundle.load(small_bundle.path).A, small_bundle.A)
+    assert [path.name for path in small_bundle.path.parent.iterdir()] == ["bundle"]
+
+
+@pytest.mark.parametrize("moment", [0, 1])
+def test_whenever_replacing_is_interrupted_a_whole_bundle_is_there(small_bundle, monkeypatch, moment):
+    moves = []
+
+    def interrupted(*names):
+        moves.append(names)
+        if len(moves) > moment:
+            raise KeyboardInterrupt
+        rename(*names)
+
+    rename = bundle.os.replace
+    monkeypatch.setattr(bundle.os, "replace", interrupted)
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            bundle.save(small_bundle.path, small_bundle.plant, {}, small_bundle.arrays)
+    old = [path for path in small_bundle.path.parent.iterdir() if path.suffix != ".unfinished"]
+    assert len(old) == 1
+    assert np.array_equal(bundle.load(old[0]).A, small_bundle.A)
+    monkeypatch.undo()
+    bundle.save(small_bundle.path, small_bundle.plant, {}, small_bundle.arrays)
+    assert [path.name for path in small_bundle.path.parent.iterdir()] == ["bundle"]
+
+
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
 @given(data=st.binary(max_size=300))
 def test_arbitrary_bytes_are_refused(copy, data):
