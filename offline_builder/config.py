@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from itertools import pairwise
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator
 
 from ema.core.config import Settings
 from ema.core.units import quantity
+
+
+def _ascending(values: list[float]) -> list[float]:
+    if any(b <= a for a, b in pairwise(values)):
+        raise ValueError("must be ascending, each value once")
+    return values
+
+
+Levels = Annotated[list[Annotated[float, Field(gt=0, le=1)]], AfterValidator(_ascending)]
 
 
 class Campaign(Settings):
@@ -21,13 +31,13 @@ class Heldout(Settings):
     """Faults that no model is fitted to, each run twice: how far models are from the truth, by size of the faults."""
 
     n: int = Field(ge=20, le=100_000, description="fault vectors for each k_max")
-    k_max: list[float] = Field(min_length=2, max_length=20, description="largest fault drawn, ascending")
+    k_max: Levels = Field(min_length=2, max_length=20, description="largest fault drawn, ascending")
 
 
 class Jacobian(Settings):
     """Finite differences at k = 0."""
 
-    steps: list[float] = Field(min_length=1, max_length=10, description="candidate steps, ascending")
+    steps: Levels = Field(min_length=1, max_length=10, description="candidate steps, ascending")
     signal_to_noise: float = quantity(
         "", "a step is taken if ‖Δi‖ exceeds its noise this many times", 10.0, gt=1, le=1e3
     )
@@ -36,10 +46,10 @@ class Jacobian(Settings):
 class Library(Settings):
     """Levels at which the LF2 library is simulated, and its polynomials."""
 
-    k1_levels: list[float]
-    k2_levels: list[float]
-    phase_levels: list[float]
-    k6_levels: list[float]
+    k1_levels: Levels = Field(min_length=1)
+    k2_levels: Levels = Field(min_length=1)
+    phase_levels: Levels = Field(min_length=1)
+    k6_levels: Levels = Field(min_length=1)
     degree_f1: int = Field(default=2, ge=1, le=5)
     degree_f2: int = Field(default=3, ge=1, le=5)
 

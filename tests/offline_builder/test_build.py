@@ -164,6 +164,13 @@ def test_qr_belongs_to_a(built):
         ("n_snapshots: 800", "n_snapshots: 3", "n_snapshots"),
         ("method: som", "method: best", "schedule.method"),
         ("k_max: 0.5", "k_max: 1.5", "k_max"),
+        ("k1_levels: [0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0]", "k1_levels: []", "library.k1_levels.* at least 1 item"),
+        ("k2_levels: [0.02, 0.05", "k2_levels: [0.05, 0.02", "library.k2_levels.*ascending"),
+        ("phase_levels: [0.05", "phase_levels: [-0.05", r"library.phase_levels.0.*greater than 0"),
+        ("k6_levels: [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7]", "k6_levels: [0.5, 3.0]", r"k6_levels.1.*equal to 1"),
+        ("k_max: [0.02, 0.05, 0.1, 0.2, 0.3, 0.5]", "k_max: [0.1]", "heldout.k_max.* at least 2 items"),
+        ("k_max: [0.02, 0.05", "k_max: [0.05, 0.05", "heldout.k_max.*each value once"),
+        ("steps: [0.02", "steps: [0", r"jacobian.steps.0.*greater than 0"),
         ("plant: actuator.yaml", "plant: nowhere.yaml", "nowhere.yaml"),
         ("n_seeds: 24", "n_seeds: many", "n_seeds"),
         ("n_seeds: 24", "n_seeds: 24\nspeed: 1", "speed"),
@@ -176,5 +183,6 @@ def test_a_wrong_builder_file_is_refused_in_one_line(tmp_path, old, new, says):
     assert old in text
     path = tmp_path / "builder.yaml"
     path.write_text(text.replace(old, new))
-    with pytest.raises(ConfigError, match=says):
+    with pytest.raises(ConfigError, match=says) as error:
         read(path)
+    assert "\n" not in str(error.value)
