@@ -16,7 +16,8 @@ import click
 def demo(out: Path, bus: str, n_cycles: int | None) -> None:
     """Build a small bundle if there is none, put a simulated actuator on a bus, let faults grow in it, and watch.
 
-    Everything goes to the output folder; what an earlier demo left there is replaced, but its bundle is used again.
+    Everything goes to the output folder; what an earlier demo left there is replaced, but its bundle is used again. Any
+    other folder that is not empty is refused.
 
     \b
     Example:

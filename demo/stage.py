@@ -24,6 +24,7 @@ class Files:
 
     out: Path
 
+    mark = property(lambda self: self.out / ".ema-demo")
     bundle = property(lambda self: self.out / "bundle")
     scenario = property(lambda self: self.out / "scenario.yaml")
     daemon = property(lambda self: self.out / "daemon.yaml")
@@ -37,9 +38,21 @@ class Files:
     report = property(lambda self: self.out / "report.html")
 
     def prepare(self) -> None:
-        """Make the folder; remove what an earlier demo made in it, but for the bundle."""
+        """Make the folder; remove what an earlier demo made in it, but for the bundle.
+
+        Raises
+        ------
+        ConfigError
+            Something is in it that no demo made.
+        """
         try:
             self.out.mkdir(parents=True, exist_ok=True)
+            if any(self.out.iterdir()) and not self.mark.exists():
+                raise ConfigError(
+                    f"{self.out}: was not made by 'ema demo' (no {self.mark.name} in it); choose another --out, "
+                    "or remove it if an older version made it"
+                )
+            self.mark.touch()
             for path in (self.scenario, self.daemon, self.truth, self.table, self.plot, self.report):
                 path.unlink(missing_ok=True)
             for path in self.log.glob("ema-*.mcap"):
