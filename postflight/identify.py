@@ -5,15 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
-
-import yaml
 
 from ema.bundle import Bundle
 from ema.bundle import load as load_bundle
 from ema.bus import codec as codecs
 from ema.bus import identifiers
-from ema.core import config
 from ema.core.errors import BundleError, LogError
 from ema.log import LogReader, Message, contents, schemas
 from ema.log.schemas import Encoded
@@ -29,6 +25,7 @@ from ema.monitor import (
     SampledEnvelope,
     answered,
 )
+from ema.monitor.recorded import configuration, monitor_settings
 
 from .open_log import names
 from .received import Log, received, received_beside, worth_a_process
@@ -63,8 +60,8 @@ def setup(log: Log, given: tuple[str, ...]) -> Setup:
         The log names no bundle, or the one it names is gone or has been built anew.
     """
     attached = log.attachments() if isinstance(log, LogReader) else {}
-    configuration = _configuration(attached)
-    named = {int(n): str(one["bundle"]) for n, one in configuration.get("actuators", {}).items()}
+    configured = configuration(attached)
+    named = {int(n): str(one["bundle"]) for n, one in configured.get("actuators", {}).items()}
     chosen = _given(given)
     numbers = sorted(set(named) | {n for n in chosen if n is not None}) or _actuators_in(log)
     paths = {n: chosen.get(n) or chosen.get(None) or named.get(n) for n in numbers}
@@ -80,8 +77,7 @@ def setup(log: Log, given: tuple[str, ...]) -> Setup:
                 f"{paths[n]}: is not the bundle that the log was made with, it has been built again; "
                 f"to compare the two, name it with --bundle"
             )
-    settings = config.validate(configuration.get("monitor", {}), MonitorSettings, "daemon.yaml in the log: monitor")
-    return Setup(bundles, settings, len(same) == len(numbers) and all(same.values()))
+    return Setup(bundles, monitor_settings(configured), len(same) == len(numbers) and all(same.values()))
 
 
 def identified(
@@ -139,15 +135,6 @@ def _encoded(answer: Output) -> Encoded:
     assert isinstance(answer, Event), "jobs are done by `answers`"
     event = contents.event(answer.t_ns, answer.level.value, answer.code, answer.text, answer.actuator)
     return schemas.EVENT.encode(event)
-
-
-def _configuration(attached: dict[str, bytes]) -> dict[str, Any]:
-    """The daemon's configuration in the log, empty without one."""
-    try:
-        found = yaml.safe_load(attached.get("daemon.yaml", b""))
-    except (yaml.YAMLError, ValueError) as error:
-        raise LogError("daemon.yaml in the log is damaged") from error
-    return found if isinstance(found, dict) and isinstance(found.get("actuators"), dict) else {}
 
 
 def _given(given: tuple[str, ...]) -> dict[int | None, str]:

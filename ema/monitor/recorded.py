@@ -9,15 +9,18 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import yaml
 
 from ema.bus import codec as codecs
 from ema.bus import identifiers
 from ema.bus.codec import Codec
+from ema.bus.protection import GOOD, Receiver
 from ema.bus.span import MOTION_RATIO
 from ema.core.config import validate
-from ema.core.errors import NoCycleError, RecordError
+from ema.core.errors import LogError, NoCycleError, RecordError
 from ema.core.records import Cycle, Record
 from ema.log import LogReader
 from ema.models.actuator import Actuator
@@ -27,7 +30,8 @@ from .assembler import Assembler
 from .cycles import AssembledCycle
 from .settings import MonitorSettings
 
-_SUPPLY = ("u_dc", "temp_w")
+_SUPPLY = "Supply"
+_HEARD = ("u_dc", "temp_w")
 
 
 def read_mcap(path: Path) -> Record:
@@ -62,18 +66,35 @@ def cycles(log: LogReader, broken: list[int] | None = None) -> Iterator[tuple[in
     ------
     RecordError
         The log does not say whose the cycles are.
+    LogError
+        The daemon's configuration in it is damaged.
     """
     codec = codecs.default()
     plants = _plants(log)
-    assembler = Assembler(codec, plants, MonitorSettings())
+    assembler = Assembler(codec, plants, monitor_settings(configuration(log.attachments())))
+    receiver = Receiver(codec, (_SUPPLY,), plants)
     supply: dict[int, dict[str, float]] = {}
     broken = [] if broken is None else broken
     for _, frames in log.frames():
         closed = [item for item in assembler.feed(frames) if isinstance(item, AssembledCycle)]
         yield from _whole(closed, plants, supply, broken)
-        _hear(codec, frames, supply)
+        _hear(codec, receiver, frames, supply)
     closed = [item for item in assembler.finish() if isinstance(item, AssembledCycle)]
     yield from _whole(closed, plants, supply, broken)
+
+
+def configuration(attached: dict[str, bytes]) -> dict[str, Any]:
+    """The daemon's configuration among the files in a log, empty without one."""
+    try:
+        found = yaml.safe_load(attached.get("daemon.yaml", b""))
+    except (yaml.YAMLError, ValueError) as error:
+        raise LogError("daemon.yaml in the log is damaged") from error
+    return found if isinstance(found, dict) and isinstance(found.get("actuators"), dict) else {}
+
+
+def monitor_settings(configured: dict[str, Any]) -> MonitorSettings:
+    """The monitor's settings in such a configuration."""
+    return validate(configured.get("monitor", {}), MonitorSettings, "daemon.yaml in the log: monitor")
 
 
 def _whole(
@@ -109,13 +130,14 @@ def _cycle(cycle: AssembledCycle, plant: Actuator, supply: dict[str, float]) -> 
     return Cycle(cycle.span.cycle, channels, f"cycle {cycle.span.cycle}")
 
 
-def _hear(codec: Codec, frames: np.ndarray, supply: dict[int, dict[str, float]]) -> None:
-    message = codec.messages["Supply"]
-    own = frames[(identifiers.message_id(frames["id"]) == message.frame_id) & (frames["length"] == message.length)]
+def _hear(codec: Codec, receiver: Receiver, frames: np.ndarray, supply: dict[int, dict[str, float]]) -> None:
+    message = codec.messages[_SUPPLY]
+    own = frames[identifiers.message_id(frames["id"]) == message.frame_id]
+    own = own[receiver.check(own) <= GOOD]
     if len(own):
         values = message.decode(own)
         for row, number in enumerate(identifiers.actuator(own["id"]).tolist()):
-            supply[number] = {name: float(values[name][row]) for name in _SUPPLY}
+            supply[number] = {name: float(values[name][row]) for name in _HEARD}
 
 
 def _plants(log: LogReader) -> dict[int, Actuator]:

@@ -13,10 +13,10 @@ from ema.log import LogReader, LogSettings, LogWriter
 from ema.monitor.recorded import cycles
 
 
-def _log(directory, flight, bundle):
+def _log(directory, flight, bundle, **attached):
     directory.mkdir()
-    manifest = json.dumps(bundle.manifest).encode()
-    with LogWriter(directory, {"manifest.json": manifest}, LogSettings(keep_free=0)) as log:
+    attachments = {"manifest.json": json.dumps(bundle.manifest).encode(), **attached}
+    with LogWriter(directory, attachments, LogSettings(keep_free=0)) as log:
         for _, frames in flight:
             log.frames(frames, "vcan0")
     return next(directory.glob("*.mcap"))
@@ -50,6 +50,30 @@ def test_a_cycle_with_a_gap_is_left_out(fly, coarse_bundle, tmp_path):
     record = read_record(_log(tmp_path / "log", flight, coarse_bundle))
     assert [cycle.number for cycle in record] == [0, 2]
     assert record.broken == (1,)
+
+
+def test_a_supply_frame_that_is_not_whole_is_not_heard(fly, bench, coarse_bundle, tmp_path):
+    flight = fly(n_cycles=2, seed=4)
+    spoilt = []
+    for truth, frames in flight:
+        places = bench.places(frames, "Supply")
+        bad = frames[places]
+        bad["data"][:, 4:] ^= 0x15  # behind the header
+        spoilt.append((truth, np.insert(frames, places + 1, bad)))
+    clean, heard = (read_record(_log(tmp_path / n, f, coarse_bundle)) for n, f in (("clean", flight), ("bad", spoilt)))
+    for one, other in zip(clean, heard, strict=True):
+        for name in ("u_dc", "temp_w"):
+            assert np.array_equal(one.channels[name], other.channels[name])
+
+
+def test_cycles_end_where_the_daemons_configuration_says(fly, coarse_bundle, tmp_path):
+    flight = fly(n_cycles=3, seed=4)
+    flight[1][1]["t_ns"][100:] += np.uint64(400_000_000)
+    flight[2][1]["t_ns"] += np.uint64(400_000_000)
+    patient = b"actuators: {0: {bundle: b}}\nmonitor: {timeout: 0.45}"
+    for name, attached, whole in (("default", {}, [0, 2]), ("patient", {"daemon.yaml": patient}, [0, 1, 2])):
+        record = read_record(_log(tmp_path / name, flight, coarse_bundle, **attached))
+        assert [cycle.number for cycle in record] == whole
 
 
 def test_a_log_that_does_not_say_whose_cycles_is_refused(fly, tmp_path):
