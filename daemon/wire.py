@@ -1,6 +1,7 @@
 """What daemon and worker process say to each other over a Unix socket: one line of JSON for a job, one for its answer.
 
-Floats go through JSON without losing a bit; NaN is null.
+Floats go through JSON without losing a bit; NaN is null. Of an estimate stays behind what only its intervals are made
+from (`marginals`, `edges`): the monitor asks for none.
 """
 
 from __future__ import annotations
@@ -71,6 +72,7 @@ def pack_answer(answer: Estimate | Exception) -> bytes:
         return _line({"error": " ".join(str(answer).split()) or repr(answer)})
     content = {name: _plain(getattr(answer, name)) for name in _ARRAYS}
     content |= {name: None if np.isnan(x := getattr(answer, name)) else float(x) for name in _NUMBERS}
+    content["unseparable"] = [_plain(direction) for direction in answer.unseparable]
     codes = {"dof": int(answer.dof), "status": int(answer.status), "reasons": int(answer.reasons)}
     return _line({"method": answer.method, **content, **codes, "nuisance": _pack_nuisance(answer.nuisance)})
 
@@ -99,6 +101,7 @@ def unpack_answer(line: bytes) -> Estimate:
         status, reasons = Status(said["status"]), Reason(said["reasons"])
         return Estimate(
             *(str(said["method"]), k, sd, covariance, chi2, int(said["dof"]), p_value, residual, status, reasons),
+            unseparable=tuple(_array(direction) for direction in said["unseparable"]),
             nuisance=_unpack_nuisance(said["nuisance"]),
         )
     except (KeyError, TypeError, ValueError) as error:
