@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ConfigDict
 
-from ema.core.config import digest, validate
-from ema.core.errors import BundleError
+from ema.core.config import Settings, digest, validate
+from ema.core.errors import BundleError, ConfigError
 from ema.core.names import FAULTS
 from ema.core.version import version
 from ema.faults import N_FAULTS
@@ -41,7 +42,30 @@ SHAPES = {
     "k2_levels": ("n_k2",), "i_BLK": ("n_k2", "n_t"),
     "k6_levels": ("n_k6",), "i_zeta": ("n_k6", "n_t"),
 }  # fmt: skip
+_ROUNDING = 1e-12  # of a covariance, as a share of its largest eigenvalue
 NUISANCE_SHAPES = {"nuisance_A": ("n_omega", "m")}  # of a bundle that carries nuisance parameters
+
+
+class _Entry(Settings):
+    """What the manifest says of an array."""
+
+    sha256: str
+    shape: list[int]
+    dtype: str
+
+
+class _Manifest(Settings):
+    """What is read of a manifest whose format, version and order of k fit; see `Bundle.plant`, `Bundle.nuisance`."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    software: str
+    plant: dict[str, Any]
+    plant_hash: str
+    builder: dict[str, Any]
+    builder_hash: str
+    figures: dict[str, float]
+    arrays: dict[str, _Entry]
 
 
 @dataclass(frozen=True)
@@ -182,22 +206,21 @@ def load(path: str | Path) -> Bundle:
         )
     if manifest.get("order_of_k") != list(FAULTS):
         raise BundleError(f"{manifest_path}: order of k is not {', '.join(FAULTS)}")
-    entries = manifest.get("arrays")
-    if not isinstance(entries, dict) or not set(SHAPES) <= set(entries):
-        missing = sorted(set(SHAPES) - set(entries or {}))
-        raise BundleError(f"{manifest_path}: lists no array '{missing[0] if missing else 'arrays'}'")
-    arrays = {name: _array(path, name, entry) for name, entry in entries.items()}
-    bundle = Bundle(path, manifest, arrays)
-    _check(bundle)
+    try:
+        entries = validate(manifest, _Manifest, manifest_path).arrays
+        bundle = Bundle(path, manifest, {name: _array(path, name, entry.sha256) for name, entry in entries.items()})
+        _check(bundle)
+    except ConfigError as error:
+        raise BundleError(str(error)) from error
     return bundle
 
 
-def _array(path: Path, name: str, entry: Any) -> np.ndarray:
+def _array(path: Path, name: str, sha256: str) -> np.ndarray:
     file = path / f"{name}.npy"
-    if Path(name).name != name or not isinstance(entry, dict):
+    if Path(name).name != name:
         raise BundleError(f"{path / 'manifest.json'}: array entry '{name[:40]}' is damaged")
     try:
-        if _sha256(file) != entry.get("sha256"):
+        if _sha256(file) != sha256:
             raise BundleError(f"{file}: is damaged (SHA-256 differs from the manifest's)")
         array: np.ndarray = np.load(file, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
@@ -227,13 +250,28 @@ def _check(bundle: Bundle) -> None:
             expected = want if isinstance(want, int) else size.setdefault(want, have)
             if have != expected:
                 raise BundleError(f"{bundle.path / name}.npy: shape {array.shape} does not fit ({want} = {expected})")
+        if not array.size:
+            raise BundleError(f"{bundle.path / name}.npy: is empty")
         if not np.isfinite(array).all():
             raise BundleError(f"{bundle.path / name}.npy: holds numbers that are not finite")
+        if shape[-2:] == ("n_omega", "n_omega") and not _is_covariance(array, name == "noise_switching"):
+            raise BundleError(f"{bundle.path / name}.npy: is no covariance (symmetric, no negative eigenvalues)")
     if digest(bundle.plant) != bundle.manifest.get("plant_hash"):
         raise BundleError(f"{bundle.path / 'manifest.json'}: the plant does not match its hash")
     s = bundle.schedule
     if s.dtype.kind != "i" or (np.diff(s) <= 0).any() or s[0] < 0 or s[-1] >= size["n_t"]:
         raise BundleError(f"{bundle.path / 'schedule.npy'}: sample indices must increase within 0…{size['n_t'] - 1}")
+
+
+def _is_covariance(S: np.ndarray, definite: bool) -> bool:
+    """Whether matrices (..., n, n) are symmetric and positive semidefinite to rounding, or `definite`.
+
+    One that is definite stays so with any of the others added, and residuals can be weighted by its inverse.
+    """
+    eigenvalues = np.linalg.eigvalsh(S)
+    least, rounding = eigenvalues[..., 0], _ROUNDING * np.abs(eigenvalues[..., -1])
+    symmetric = np.abs(S - np.swapaxes(S, -1, -2)).max(axis=(-2, -1)) <= rounding
+    return bool((symmetric & (least > 0.0 if definite else least >= -rounding)).all())
 
 
 def _sha256(path: Path) -> str:

@@ -11,7 +11,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ema import bundle
-from ema.core.errors import EmaError
+from ema.core.errors import BundleError, EmaError
+
+KEYS = [
+    *("format", "version", "software", "order_of_k", "plant", "plant_hash"),
+    *("builder", "builder_hash", "figures", "arrays"),
+]
+FACTS = {"builder_hash": "", "figures": {}}
 
 
 @pytest.fixture
@@ -43,6 +49,7 @@ def test_a_sound_bundle_loads_as_it_was_saved(small_bundle):
         (lambda p: edited(p, order_of_k=["k2", "k1", "k3", "k4", "k5", "k6"]), "order of k"),
         (lambda p: edited(p, arrays={}), "lists no array"),
         (lambda p: edited(p, nuisance=[{"parameter": "magnet_flux.change"}]), "entry 'nuisance' is damaged"),
+        (lambda p: edited(p, arrays={"A": "sound"}), "key 'arrays.A' = 'sound'"),
         (lambda p: edited(p, plant={}), "manifest.json"),
         (lambda p: (p / "A.npy").write_bytes((p / "A.npy").read_bytes()[:-8]), "A.npy: is damaged"),
         (lambda p: (p / "A.npy").unlink(), "A.npy: cannot be read"),
@@ -56,17 +63,51 @@ def test_damage_is_named(copy, damage, says):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("key", KEYS)
+def test_a_manifest_without_a_key_is_refused(copy, key):
+    manifest = json.loads((copy / "manifest.json").read_text())
+    assert list(manifest) == KEYS
+    del manifest[key]
+    (copy / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(BundleError, match="manifest") as error:
+        bundle.load(copy)
+    assert "\n" not in str(error.value)
+
+
+def indefinite(S):
+    return S - 2.0 * np.eye(len(S))[0] * np.eye(len(S))
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "says"),
+    [
+        ("schedule", lambda a: a[:0], "schedule.npy: is empty"),
+        ("f1", lambda a: a[:0], "f1.npy: is empty"),
+        ("noise_switching", indefinite, "noise_switching.npy: is no covariance"),
+        ("noise_switching", lambda S: np.diag(np.arange(len(S), dtype=float)), "noise_switching.npy: is no covariance"),
+        ("noise_switching", lambda S: S + 1e-6 * np.triu(S @ np.ones_like(S), 1), "is no covariance"),
+        ("noise_start_k", indefinite, "noise_start_k.npy: is no covariance"),
+        ("noise_lf2", lambda M: np.stack([M[0], -M[1]]), "noise_lf2.npy: is no covariance"),
+    ],
+)
+def test_arrays_no_estimate_could_be_made_with_are_refused(small_bundle, name, change, says):
+    arrays = small_bundle.arrays | {name: change(small_bundle.arrays[name])}
+    with pytest.raises(BundleError, match=says) as error:
+        bundle.save(small_bundle.path, small_bundle.plant, {}, arrays, **FACTS)
+    assert "\n" not in str(error.value)
+
+
 def test_a_folder_that_is_no_bundle_is_not_overwritten(small_bundle, tmp_path):
     (tmp_path / "precious.txt").write_text("mine")
     with pytest.raises(EmaError, match="is not a bundle"):
-        bundle.save(tmp_path, small_bundle.plant, {}, small_bundle.arrays)
+        bundle.save(tmp_path, small_bundle.plant, {}, small_bundle.arrays, **FACTS)
     assert (tmp_path / "precious.txt").read_text() == "mine"
 
 
 def test_a_bundle_that_could_not_be_loaded_does_not_replace_one(small_bundle):
     broken = small_bundle.arrays | {"A": np.full_like(small_bundle.A, np.nan)}
     with pytest.raises(EmaError, match=r"bundle: is not written.*A\.npy: holds numbers that are not finite") as error:
-        bundle.save(small_bundle.path, small_bundle.plant, {}, broken)
+        bundle.save(small_bundle.path, small_bundle.plant, {}, broken, **FACTS)
     assert "\n" not in str(error.value)
     assert np.array_equal(bundle.load(small_bundle.path).A, small_bundle.A)
     assert [path.name for path in small_bundle.path.parent.iterdir()] == ["bundle"]
@@ -86,12 +127,12 @@ def test_whenever_replacing_is_interrupted_a_whole_bundle_is_there(small_bundle,
     monkeypatch.setattr(bundle.os, "replace", interrupted)
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
-            bundle.save(small_bundle.path, small_bundle.plant, {}, small_bundle.arrays)
+            bundle.save(small_bundle.path, small_bundle.plant, {}, small_bundle.arrays, **FACTS)
     old = [path for path in small_bundle.path.parent.iterdir() if path.suffix != ".unfinished"]
     assert len(old) == 1
     assert np.array_equal(bundle.load(old[0]).A, small_bundle.A)
     monkeypatch.undo()
-    bundle.save(small_bundle.path, small_bundle.plant, {}, small_bundle.arrays)
+    bundle.save(small_bundle.path, small_bundle.plant, {}, small_bundle.arrays, **FACTS)
     assert [path.name for path in small_bundle.path.parent.iterdir()] == ["bundle"]
 
 

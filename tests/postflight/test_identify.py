@@ -73,7 +73,7 @@ def other_bundle(coarse_bundle, tmp_path_factory):
     """A bundle with another nominal envelope."""
     arrays = coarse_bundle.arrays | {"i0": coarse_bundle.i0 * 1.001}
     path = tmp_path_factory.mktemp("other") / "bundle"
-    return bundles.save(path, coarse_bundle.plant, {}, arrays)
+    return bundles.save(path, coarse_bundle.plant, {}, arrays, builder_hash="", figures={})
 
 
 @pytest.mark.parametrize("n_processes", [1, 2])
