@@ -142,12 +142,22 @@ class Bundle:
         )
 
 
+def check_target(path: Path) -> None:
+    """BundleError where a bundle cannot be saved without replacing what is none."""
+    if Path.cwd().is_relative_to(path.resolve()):
+        raise BundleError(f"{path}: is the working directory or above it; choose another --out")
+    try:
+        if path.exists() and not (path / "manifest.json").exists() and (not path.is_dir() or any(path.iterdir())):
+            raise BundleError(f"{path}: exists and is not a bundle; choose another --out or remove it")
+    except OSError as error:
+        raise BundleError(f"{path}: cannot be looked into ({error.strerror})") from error
+
+
 def save(path: Path, plant: Actuator, builder: dict[str, Any], arrays: dict[str, np.ndarray], **facts: Any) -> Bundle:
     """Write a bundle whole and fit to be loaded, or not at all; refuses to replace anything that is not a bundle."""
     path = Path(path)
+    check_target(path)
     home = path.resolve()
-    if path.exists() and not (path / "manifest.json").exists() and (not path.is_dir() or any(path.iterdir())):
-        raise BundleError(f"{path}: exists and is not a bundle; choose another --out or remove it")
     scratch = home.with_name(home.name + ".unfinished")
     shutil.rmtree(scratch, ignore_errors=True)
     try:

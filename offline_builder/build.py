@@ -36,6 +36,7 @@ def build(
     say: Callable[[str], None] = lambda text: None,
 ) -> Bundle:
     """Run (or resume) the campaign and write the bundle; the work folder is removed when the bundle stands."""
+    bundles.check_target(out)
     work = out.with_name(out.name + ".work")
     with claimed(work):
         nuisance = resolve(builder, plant)

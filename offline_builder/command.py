@@ -41,7 +41,7 @@ def build(config_path: Path, out: Path, workers: int | None, scheduler: str | No
         bar.update(task, completed=done, total=of)
 
     with ExitStack() as stack:
-        stack.callback(bar.stop)
+        stack.callback(lambda: bar.stop() if bar.live.is_started else None)  # else it would print an empty line
         pool = stack.enter_context(executor(workers, scheduler))
         made = phase.build(builder, plant, out, pool, progress, lambda text: console.print(f"  {text}"))
     figures = made.manifest["figures"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import resource
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -78,6 +79,20 @@ def test_another_configuration_does_not_take_over_unfinished_work(tiny, plant, t
     changed = tiny.model_copy(update={"seed": 8})
     with pytest.raises(BundleError, match="another configuration"):
         build(changed, plant, out, Counting())
+
+
+def test_where_no_bundle_can_be_is_said_before_the_first_run(tiny, plant, tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    Path("file").write_text("precious")
+    pool = Counting()
+    for out, says in ((".", "working directory"), ("..", "working directory"), ("/", "working directory"),
+                      ("file", "is not a bundle"), ("file/bundle", "Not a directory")):  # fmt: skip
+        with pytest.raises(BundleError, match=says):
+            build(tiny, plant, Path(out), pool)
+    assert pool.count == 0
+    assert [path.name for path in tmp_path.rglob("*")] == ["here", "file"]
+    assert Path("file").read_text() == "precious"
 
 
 def test_two_builds_into_one_folder_do_not_meet(tiny, plant, tmp_path):

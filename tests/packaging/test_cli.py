@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from ema.cli import cli
+from ema.core import resources
 from ema.core.version import version
 
 COMMANDS = sorted(entry.name for entry in entry_points(group="ema.commands"))
@@ -54,6 +55,7 @@ def test_every_subcommand_explains_itself_with_an_example(name):
         (["build"], "--config"),
         (["build", "--config", "nowhere.yaml", "--out", "x"], "nowhere.yaml"),
         (["build", "--config", "README.md", "--out", "x"], "README.md"),
+        (["build", "--config", str(resources.config("builder-quick.yaml")), "--out", "README.md"], "not a bundle"),
     ],
 )
 def test_wrong_use_is_one_line_and_status_two(arguments, says, tmp_path, monkeypatch):
