@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from collections.abc import Callable
@@ -18,7 +19,8 @@ import click
 def reproduce(out: Path, config_path: Path | None, workers: int | None) -> None:
     """Build the bundle (DIR/bundle), run every experiment, write figures and reproduction.md.
 
-    Each experiment's numbers are kept in DIR; an interrupted run goes on where it was when called again.
+    Each experiment's numbers are kept in DIR; an interrupted run goes on where it was when called again. Numbers of
+    another bundle or of other software are not used again.
 
     \b
     Example:
@@ -28,6 +30,7 @@ def reproduce(out: Path, config_path: Path | None, workers: int | None) -> None:
     from ema.core import resources
     from ema.core.config import digest
     from ema.core.errors import ConfigError
+    from ema.core.version import version
 
     from . import build, experiments, reproduction_figures, reproduction_page
     from .config import Schedule
@@ -35,7 +38,10 @@ def reproduce(out: Path, config_path: Path | None, workers: int | None) -> None:
 
     builder, plant = build.read(config_path or resources.config("builder.yaml"))
     builder = builder.model_copy(update={"schedule": Schedule()})  # the paper's, whatever else is in use
-    out.mkdir(parents=True, exist_ok=True)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"{out}: cannot be used as output folder ({error.strerror})") from error
     click.echo(f"seeds: builder {builder.seed}, experiments {experiments.SEED}", err=True)
     path = out / "bundle"
     if not path.exists():
@@ -45,7 +51,8 @@ def reproduce(out: Path, config_path: Path | None, workers: int | None) -> None:
     if bundle.manifest.get("builder_hash") != digest(builder):
         raise ConfigError(f"{path}: was built from another configuration; remove it or choose another --out")
     bench = experiments.Bench(bundle, workers or os.cpu_count() or 1)
-    results = {name: _stage(out, name, run) for name, run in _stages(bench).items()}
+    of = {"bundle": hashlib.sha256((path / "manifest.json").read_bytes()).hexdigest(), "software": version()}
+    results = {name: stage(out, name, run, of) for name, run in _stages(bench).items()}
     reproduction_figures.draw(out, bundle, results)
     page = reproduction_page.page(bundle, results)
     (out / "reproduction.md").write_text(page, encoding="utf-8")
@@ -70,15 +77,19 @@ def _stages(bench: Any) -> dict[str, Callable[[], dict[str, Any]]]:
     return stages
 
 
-def _stage(out: Path, name: str, run: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """The experiment's numbers: from its file if it has been run, else run now."""
+def stage(out: Path, name: str, run: Callable[[], dict[str, Any]], of: dict[str, str]) -> dict[str, Any]:
+    """The experiment's numbers: from its file if it has been run with what `of` names, else run now."""
     file = out / f"{name.replace(' ', '_')}.json"
-    if file.exists():
+    try:
         done: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        return done
+        if done["of"] == of:
+            kept: dict[str, Any] = done["numbers"]
+            return kept
+    except (OSError, ValueError, KeyError, TypeError):  # not there, not finished, or of an earlier format
+        pass
     click.echo(f"  {name}", err=True)
     result = run()
     unfinished = file.with_suffix(".part")
-    unfinished.write_text(json.dumps(result, indent=1), encoding="utf-8")
+    unfinished.write_text(json.dumps({"of": of, "numbers": result}, indent=1), encoding="utf-8")
     os.replace(unfinished, file)
     return result
