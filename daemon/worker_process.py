@@ -70,12 +70,10 @@ class Server:
             waiting += part
             if not part or len(waiting) > wire.MAX_LINE:
                 return
-            while b"\n" in waiting:
+            while b"\n" in waiting and not stop.is_set():
                 line, _, waiting = waiting.partition(b"\n")
                 try:
-                    connection.settimeout(None)
-                    connection.sendall(wire.pack_answer(self._answer(bytes(line))))
-                    connection.settimeout(_LOOK_UP)
+                    _send(connection, wire.pack_answer(self._answer(bytes(line))), stop)
                 except OSError:
                     return
 
@@ -92,6 +90,17 @@ class Server:
         """Run jobs once, so that whatever is compiled is compiled before the first real one."""
         for job in jobs:
             self._runner.run(job)
+
+
+def _send(connection: socket.socket, answer: bytes, stop: threading.Event) -> None:
+    """All of it, however slowly the daemon reads; once `stop` is set, one that does not read is not waited for."""
+    left = memoryview(answer)
+    while left:
+        try:
+            left = left[connection.send(left) :]
+        except TimeoutError:
+            if stop.is_set():
+                return
 
 
 def _listens(path: Path) -> bool:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -34,21 +35,32 @@ def recover(source: Path, target: Path) -> Recovered:
     Raises
     ------
     LogError
-        `source` is no MCAP file, or `target` exists or cannot be written.
+        `source` is no MCAP file or cannot be read, or `target` exists or cannot be written.
     """
     damage: list[Damage] = []
     file = McapFile(source, damage.append)
     try:
-        with target.open("xb") as output:
+        with _new(target) as output:
             count, first, last = _copy(file, output)
     except FileExistsError as error:
         raise LogError(f"{target}: exists, and is not overwritten") from error
     except OSError as error:
-        target.unlink(missing_ok=True)
         raise LogError(f"{target}: cannot be written ({error.strerror})") from error
     finally:
         file.close()
     return Recovered(source, target, count, first, last, list(dict.fromkeys(damage)))
+
+
+@contextmanager
+def _new(target: Path) -> Iterator[BinaryIO]:
+    """A new file, which is only there afterwards if all of it could be written."""
+    output = target.open("xb")
+    try:
+        with output:
+            yield output
+    except BaseException:
+        target.unlink(missing_ok=True)
+        raise
 
 
 def is_sound(path: Path) -> bool:

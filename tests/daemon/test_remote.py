@@ -136,6 +136,27 @@ def test_whatever_is_said_to_the_worker_gets_one_answer(served):
             assert "error" in json.loads(answers.readline())
 
 
+def test_a_daemon_that_does_not_read_its_answer_does_not_keep_the_worker_from_stopping(
+    coarse_bundle, tmp_path, monkeypatch
+):
+    stop, answered = threading.Event(), threading.Event()
+
+    def long_answer(answer):
+        answered.set()
+        return bytes(1 << 24)
+
+    monkeypatch.setattr(wire, "pack_answer", long_answer)
+    thread = threading.Thread(target=Server(tmp_path / "socket", {0: coarse_bundle}).run, args=(stop,))
+    thread.start()
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as sock:
+        sock.connect(str(tmp_path / "socket"))
+        sock.sendall(b"\n")
+        assert answered.wait(10)
+        stop.set()
+        thread.join(10)
+        assert not thread.is_alive()
+
+
 ANYTHING = st.dictionaries(st.text(), st.integers()).map(lambda said: json.dumps(said).encode())
 
 
