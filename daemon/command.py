@@ -36,9 +36,13 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
 
     from .assembly import assembled
 
-    with assembled(settings) as service:
-        on_stop(service.stop)
-        try:
+    started = False
+    try:
+        with assembled(settings) as service:
+            on_stop(service.stop)
+            started = True
             service.run()
-        except EmaError as error:  # not of the configuration, which was good enough to start
+    except EmaError as error:
+        if started:  # so it is not of the configuration
             raise Failure(str(error)) from error
+        raise

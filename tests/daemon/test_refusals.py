@@ -120,23 +120,26 @@ def test_the_user_sees_one_line(write_config, tmp_path):
     assert not list((tmp_path / "log").iterdir())
 
 
-def test_what_fails_later_is_not_taken_for_a_bad_configuration(write_config):
+@pytest.mark.parametrize("where", ["Service.run", "SegmentedLog.close"])
+def test_what_fails_later_is_not_taken_for_a_bad_configuration(write_config, where):
     """Exit status 1: after 2 the service manager does not start it again."""
     code = f"""
 import sys
 from ema_daemon.service import Service
 from ema.cli import main
-from ema.core.errors import BusError
+from ema.core.errors import EmaError
+from ema.log.segmented import SegmentedLog
 
-def run(self):
-    raise BusError("vcan0: gone")
+def fail(self):
+    raise EmaError("gone")
 
-Service.run = run
+Service.run = Service.stop
+{where} = fail
 sys.argv[1:] = ["daemon", "--config", "{write_config()}"]
 main()
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stderr) == (1, "ema: vcan0: gone\n")
+    assert (done.returncode, done.stderr) == (1, "ema: gone\n")
 
 
 def test_the_process_stays_small():
