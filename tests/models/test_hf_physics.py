@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from ema.core import config, resources
+from ema.effects import registry
 from ema.models import hf
 from ema.models.actuator import Actuator
 from ema.models.layout import STATE
@@ -262,3 +264,27 @@ def test_late_comparators_let_the_current_leave_the_band_by_what_it_moves_meanwh
     slope = held.inverter.V_dc / held.motor.L
     none, half, one, three = map(highest, (0.0, 0.5e-6, 1e-6, 3e-6))
     assert none < half < one < three < none + 3e-6 * slope
+
+
+def test_currents_are_recorded_as_far_as_the_converter_reaches():
+    """Without a limit of its own that is the plant's range, whatever it is; with one, that."""
+    strong = {
+        "inverter": {"I_max": 50.0, "V_dc": 150.0},
+        "transmission": {"F_s": 10.0, "F_d": 9.0},
+    }  # held: it draws what it may
+    command = np.full(1000, 0.05)
+
+    def top(adc_range: float, **effects) -> float:
+        plant = varied(**strong, sensors={"adc_range": adc_range})
+        return float(np.abs(hf.simulate(plant, np.zeros(6), command, effects=effects).i).max())
+
+    step = 2 * 100.0 / 2**PLANT.sensors.adc_bits
+    true = top(100.0)
+    assert 40.0 < true < 60.0
+    assert top(35.0) == pytest.approx(35.0, abs=step)
+    assert top(100.0, adc_saturation={"limit": 38.0}) == pytest.approx(38.0, abs=step)
+    assert top(100.0, adc_saturation={"limit": 12.0}) == pytest.approx(12.0, abs=step)
+    neutral = registry()["adc_saturation"].neutral()["limit"]  # clips nothing that any plant's converter would record
+    assert varied(sensors={"adc_range": neutral}).sensors.adc_range == neutral
+    with pytest.raises(ValidationError):
+        varied(sensors={"adc_range": 1.001 * neutral})

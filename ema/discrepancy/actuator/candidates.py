@@ -252,7 +252,7 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line:
             found += [_plain(effect, "per_kelvin"), _plain(effect, "change", "per_kelvin")]
     top = max(float(np.abs(s.i).max()) for s in data.signals)
     if any(int((np.abs(s.i) > top - FLAT).sum()) >= FLAT_SAMPLES for s in data.signals):
-        limit = free("adc_saturation.limit", CLIPPED_STEP)
+        limit = Free("adc_saturation.limit", 0.5 * top, plant.sensors.adc_range, CLIPPED_STEP)
         found.append(Seen("adc_saturation", (limit,), {}, ("limit",), (top,)))
     if not torques:
         return found

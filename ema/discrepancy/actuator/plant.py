@@ -69,7 +69,10 @@ class EmaPlant:
             return 0.0
         effect, parameter = name.split(".")
         declared = self.plant.effects.get(effect, {})
-        return float(declared.get(parameter, registry()[effect].neutral()[parameter]))
+        neutral = registry()[effect].neutral()[parameter]
+        if name == "adc_saturation.limit":  # beyond the converter's range no limit makes a difference
+            neutral = self.plant.sensors.adc_range
+        return float(declared.get(parameter, neutral))
 
     def simulate(
         self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], steps: Steps = None
