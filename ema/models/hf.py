@@ -24,7 +24,7 @@ from .layout import ENERGIES, N_ROWS, N_STATE, STATE, row
 N_LANES = 16
 DT = 1e-6  # [s]
 NO_FILTER = 1e-6  # of the time constants: far below a step
-N_RING = 64  # control ticks remembered for delays
+N_RING = 64  # control ticks remembered for delays at least
 
 Effects = Mapping[str, Mapping[str, float | np.ndarray]]
 
@@ -199,6 +199,10 @@ def simulate(
             lvdt_noise[run] = plant.sensors.lvdt_noise * rng.standard_normal(n_recorded)
             current_noise[run] = plant.sensors.current_noise * rng.standard_normal((3, n_recorded))
 
+    longest = max(z[row(f"{signal}_delay.time")].max() for signal in ("position", "speed"))
+    ticks = min(longest / (T * (1.0 + shared.min())), n_recorded)  # before the first sample there is nothing to see
+    n_ring = max(N_RING, int(np.ceil(ticks)) + 2)
+
     n_lanes = 1 if n == 1 else N_LANES
     out = np.empty((n, len(OUTPUTS), n_recorded))
     t = np.arange(n_recorded) * T
@@ -208,7 +212,7 @@ def simulate(
         more = (0, 0), (0, beyond[runs[0]])
         zb = np.ascontiguousarray(z[:, lanes]).ravel()
         ob = np.empty((len(OUTPUTS), n_recorded + beyond[runs[0]], n_lanes))
-        history = np.zeros((2, N_RING, n_lanes))
+        history = np.zeros((2, n_ring, n_lanes))
         integrate(
             zb,
             np.ascontiguousarray(np.pad(command[lanes], more, mode="edge").T),

@@ -288,3 +288,20 @@ def test_currents_are_recorded_as_far_as_the_converter_reaches():
     assert varied(sensors={"adc_range": neutral}).sensors.adc_range == neutral
     with pytest.raises(ValidationError):
         varied(sensors={"adc_range": 1.001 * neutral})
+
+
+@pytest.mark.parametrize("signal", ["position", "speed"])
+def test_a_delay_is_as_long_as_it_is_said_at_any_rate_of_control(signal):
+    """At twice the rate it is twice as many ticks; longer than the record, the controller sees the start only."""
+    fast = varied(control={"rate": 5e4}, motion={"duration": 0.2})
+
+    def seen(delay: float) -> np.ndarray:
+        effects = {f"{signal}_delay": {"time": delay}}
+        return hf.simulate(fast, np.zeros(6), noise=False, effects=effects).I_ref[0]
+
+    plain, one, four = seen(0.0), seen(1.3e-3), seen(4e-3)
+    assert np.abs(four - one).max() > 0.1
+    assert not np.array_equal(four, plain)
+    never = seen(10.0)
+    assert np.array_equal(never, seen(20.0))
+    assert not np.array_equal(never, four)
