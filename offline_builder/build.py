@@ -11,6 +11,7 @@ from typing import Any
 from ema import bundle as bundles
 from ema.bundle import Bundle
 from ema.core import config
+from ema.models import actuator_file
 from ema.models.actuator import Actuator
 
 from . import campaign
@@ -24,7 +25,7 @@ from .runs import plan
 def read(path: Path) -> tuple[Builder, Actuator]:
     """The builder's configuration and the plant it names."""
     builder = config.load(path, Builder)
-    return builder, config.load(path.parent / builder.plant, Actuator)
+    return builder, actuator_file.load(path.parent / builder.plant)
 
 
 def build(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from ema.bus.identifiers import N_ACTUATORS
 from ema.bus.interface import BusSettings, elsewhere
@@ -13,7 +13,8 @@ from ema.core import config, resources
 from ema.core.config import Settings
 from ema.core.errors import ConfigError
 from ema.core.units import quantity
-from ema.effects import registry
+from ema.effects import checked
+from ema.models import actuator_file
 from ema.models.actuator import Actuator
 
 from .profile import FaultProfile, TemperatureProfile
@@ -47,7 +48,9 @@ class ActuatorScenario(Settings):
     number: int = Field(default=0, ge=0, lt=N_ACTUATORS)
     faults: Faults = Faults()
     temperature: TemperatureProfile = TemperatureProfile(20.0)  # of the winding; acts through effects only
-    effects: dict[str, dict[str, float]] = Field(default_factory=dict)
+    effects: Annotated[dict[str, dict[str, float]], AfterValidator(lambda effects: checked(effects, "ema"))] = Field(
+        default_factory=dict
+    )
 
 
 class Gap(Settings):
@@ -96,15 +99,13 @@ def load(path: str | Path) -> tuple[Scenario, Actuator]:
     """A scenario and its plant; ConfigError when either is wrong or they do not fit together."""
     scenario = config.load(path, Scenario)
     beside = Path(path).parent / scenario.actuator
-    plant = config.load(beside if beside.exists() else resources.config(scenario.actuator), Actuator)
+    plant = actuator_file.load(beside if beside.exists() else resources.config(scenario.actuator))
     least = plant.motion.duration + scenario.return_time + scenario.stagger * (len(scenario.actuators) - 1)
     if scenario.period < least:
         raise ConfigError(
             f"{path}: key 'period' = {scenario.period:g}: must be at least {least:g} s (test motion and way back, "
             "of the last actuator if they are staggered)"
         )
-    for actuator in scenario.actuators:
-        _check_effects(actuator.effects, path)
     return scenario, plant
 
 
@@ -113,13 +114,3 @@ def override(scenario: Scenario, bus: str | None, rate: float | None, n_cycles: 
     place = bus and elsewhere(scenario.bus, bus)
     said = {"bus": place, "rate": rate, "n_cycles": n_cycles}
     return scenario.model_copy(update={key: value for key, value in said.items() if value})
-
-
-def _check_effects(effects: dict[str, dict[str, float]], path: str | Path) -> None:
-    known = registry()
-    for name, values in effects.items():
-        if name not in known:
-            raise ConfigError(f"{path}: effect '{name}' is unknown; known: {', '.join(known)}")
-        parameters = [p.name for p in known[name].parameters]
-        if odd := sorted(values.keys() - set(parameters)):
-            raise ConfigError(f"{path}: effect '{name}' has no parameter '{odd[0]}'; it has: {', '.join(parameters)}")

@@ -16,7 +16,7 @@ from .base import HOOKS, Effect, Parameter
 
 V = TypeVar("V", bound="float | np.ndarray")
 
-__all__ = ["HOOKS", "Effect", "Parameter", "checked", "registry"]
+__all__ = ["HOOKS", "Effect", "Parameter", "checked", "known", "registry"]
 
 
 @cache
@@ -27,12 +27,25 @@ def registry() -> MappingProxyType[str, Effect]:
     return MappingProxyType({effect.name: effect for effect in found if effect is not None})
 
 
-def checked(effects: Mapping[str, Mapping[str, V]], plant: str) -> Mapping[str, Mapping[str, V]]:
+def checked(effects: Mapping[str, Mapping[str, float]], plant: str) -> Mapping[str, Mapping[str, float]]:
+    """Values of effects as a file gives them, if they are `known` and a model can simulate them; else ValueError."""
+    for name, values in known(effects, plant).items():
+        effect = registry()[name]
+        full = {**effect.neutral(), **values}
+        for parameter, limit in effect.limits.items():
+            if not limit.holds(full[parameter]):
+                raise ValueError(f"effect '{name}': {parameter} = {full[parameter]:g} must be {limit.says}")
+        if effect.is_table and not full["low"] < full["high"]:
+            raise ValueError(f"effect '{name}': low = {full['low']:g} must be below high = {full['high']:g}")
+    return effects
+
+
+def known(effects: Mapping[str, Mapping[str, V]], plant: str) -> Mapping[str, Mapping[str, V]]:
     """Values of effects, if all of them exist for a plant (``ema`` or ``axis``) and are finite; else ValueError."""
     for name, values in effects.items():
-        known = [n for n, effect in registry().items() if plant in effect.plants]
-        if name not in known:
-            raise ValueError(f"effect '{name}' is unknown; known for kind {plant}: {', '.join(known)}")
+        there = [n for n, effect in registry().items() if plant in effect.plants]
+        if name not in there:
+            raise ValueError(f"effect '{name}' is unknown; known for kind {plant}: {', '.join(there)}")
         has = [p.name for p in registry()[name].parameters]
         for parameter, value in values.items():
             if parameter not in has:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import POSITIVE, Effect, Parameter
 
 WIDEST = 1000.0  # [A] no plant's converter reaches further (`Sensors.adc_range`): clips nothing before that does
 
@@ -13,4 +13,5 @@ EFFECT = Effect(
     separated_by="a motion with lower current",
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema",),
+    limits={"limit": POSITIVE},
 )

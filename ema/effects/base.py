@@ -31,6 +31,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import NamedTuple
 
 HOOKS = MappingProxyType(
     {
@@ -50,6 +51,20 @@ HOOKS = MappingProxyType(
 
 T_REFERENCE = 20.0  # [°C] winding temperature that a plant's numbers belong to
 ABSENT = -1.0  # as the low end of a relative change: nothing is left, which is credible
+
+
+class Limit(NamedTuple):
+    """What a value must be so that it can be simulated at all, credible or not."""
+
+    says: str
+    holds: Callable[[float], bool]
+
+
+POSITIVE = Limit("above 0", lambda x: x > 0.0)
+NOT_NEGATIVE = Limit("at least 0", lambda x: x >= 0.0)
+SOME_LEFT = Limit("above -1", lambda x: x > ABSENT)  # of a relative change
+SHARE = Limit("between -1 and 1", lambda x: abs(x) < 1.0)
+NOT_REVERSED = Limit("at least -1", lambda x: x >= ABSENT)
 
 
 @dataclass(frozen=True)
@@ -84,6 +99,8 @@ class Effect:
         The experiment (motion, temperature, channel) that tells it from its look-alikes.
     plants : tuple of str
         Plants in which it has a meaning: ``ema`` (three-phase actuator), ``axis`` (single inertia or mass).
+    limits : mapping of str to Limit
+        Of parameters that cannot have just any value.
     """
 
     name: str
@@ -94,6 +111,7 @@ class Effect:
     mistaken_for: tuple[str, ...] = ()
     plants: tuple[str, ...] = ("ema",)
     besides: Mapping[str, str] = field(default_factory=dict)
+    limits: Mapping[str, Limit] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         unknown = set(self.laws) - set(HOOKS)

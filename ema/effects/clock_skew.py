@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import SHARE, Effect, Parameter
 
 EFFECT = Effect(
     name="clock_skew",
@@ -15,4 +15,5 @@ EFFECT = Effect(
     separated_by="a record with an external time mark",
     mistaken_for=("k1", "k2"),
     plants=("ema", "axis"),
+    limits={"rate": SHARE, "shared": SHARE},
 )

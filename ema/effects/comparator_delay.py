@@ -5,7 +5,7 @@ Currents overshoot the hysteresis band by what they move in that time, 0.1 A/µs
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Parameter
 
 EFFECT = Effect(
     name="comparator_delay",
@@ -16,4 +16,5 @@ EFFECT = Effect(
     separated_by="gate signals, or currents sampled without anti-alias filter",
     mistaken_for=(),
     plants=("ema",),
+    limits={"time": NOT_NEGATIVE},
 )

@@ -5,7 +5,7 @@ What the controller sees is not filtered; only the record is.
 
 from __future__ import annotations
 
-from .base import ABSENT, Effect, Parameter
+from .base import ABSENT, NOT_REVERSED, Effect, Parameter
 
 EFFECT = Effect(
     name="current_filter",
@@ -24,4 +24,5 @@ EFFECT = Effect(
     separated_by="a step of current with the rotor locked",
     mistaken_for=(),
     plants=("ema",),
+    limits={"change": NOT_REVERSED},
 )

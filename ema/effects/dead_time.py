@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Parameter
 
 EFFECT = Effect(
     name="dead_time",
@@ -11,4 +11,5 @@ EFFECT = Effect(
     separated_by="phase voltages, or currents sampled without anti-alias filter",
     mistaken_for=("k1",),
     plants=("ema",),
+    limits={"time": NOT_NEGATIVE},
 )

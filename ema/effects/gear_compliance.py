@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import NOT_NEGATIVE, POSITIVE, Effect, Parameter
 
 EFFECT = Effect(
     name="gear_compliance",
@@ -15,4 +15,5 @@ EFFECT = Effect(
     separated_by="fast motion with both θ_m and θ_u measured",
     mistaken_for=("k2",),
     plants=("ema", "axis"),
+    limits={"compliance": NOT_NEGATIVE, "inertia": POSITIVE, "damping": NOT_NEGATIVE},
 )

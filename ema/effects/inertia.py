@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import SOME_LEFT, Effect, Parameter
 
 EFFECT = Effect(
     name="inertia",
@@ -11,4 +11,5 @@ EFFECT = Effect(
     separated_by="weighing, or a known load that changes only the torque",
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema", "axis"),
+    limits={"change": SOME_LEFT},
 )

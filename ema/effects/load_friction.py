@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Parameter
 
 
 def factor(theta_m, w_m, theta_u, direction, tau_load, per_torque):
@@ -22,4 +22,5 @@ EFFECT = Effect(
     laws={"static_friction": factor, "sliding_friction": factor},
     mistaken_for=("k1",),
     plants=("ema", "axis"),
+    limits={"per_torque": NOT_NEGATIVE},
 )

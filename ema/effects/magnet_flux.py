@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import NOT_REVERSED, Effect, Parameter
 
 
 def emf_factor(i_j, dT, change, per_kelvin):
@@ -30,4 +30,5 @@ EFFECT = Effect(
     laws={"emf_factor": emf_factor},
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema", "axis"),
+    limits={"change": NOT_REVERSED},
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Parameter
 
 EFFECT = Effect(
     name="position_delay",
@@ -11,4 +11,5 @@ EFFECT = Effect(
     separated_by="a step or fast chirp with the motor angle recorded",
     mistaken_for=("k1", "k3", "k4", "k5"),
     plants=("ema", "axis"),
+    limits={"time": NOT_NEGATIVE},
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import NOT_REVERSED, POSITIVE, Effect, Parameter
 from .vector_math import exp_negative
 
 
@@ -24,4 +24,5 @@ EFFECT = Effect(
     laws={"static_friction": factor, "sliding_friction": factor},
     mistaken_for=("k1",),
     plants=("ema", "axis"),
+    limits={"height": NOT_REVERSED, "width": POSITIVE},
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Parameter
 
 
 def emf_factor(i_j, dT, emf, inductance):
@@ -27,4 +27,5 @@ EFFECT = Effect(
     laws={"emf_factor": emf_factor, "inductance_factor": inductance_factor},
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema", "axis"),
+    limits={"emf": NOT_NEGATIVE, "inductance": NOT_NEGATIVE},
 )

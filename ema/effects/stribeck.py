@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import NOT_REVERSED, POSITIVE, Effect, Parameter
 from .vector_math import exp_negative
 
 
@@ -26,4 +26,5 @@ EFFECT = Effect(
     laws={"sliding_friction": factor},
     mistaken_for=("k1",),
     plants=("ema", "axis"),
+    limits={"excess": NOT_REVERSED, "speed": POSITIVE},
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from .base import Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Parameter
 
 
 @njit(inline="always")
@@ -41,4 +41,5 @@ EFFECT = Effect(
     besides={"capacitance": ", behind a capacitor of {capacitance:.2g} F"},
     separated_by="record of the bus voltage; a motion fast enough to reach the voltage limit",
     plants=("ema", "axis"),
+    limits={"resistance": NOT_NEGATIVE, "capacitance": NOT_NEGATIVE},
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import NOT_REVERSED, Effect, Parameter
 
 
 def factor(dT, change, per_kelvin):
@@ -21,4 +21,5 @@ EFFECT = Effect(
     separated_by="phase voltage at known current, or a motion at the voltage limit",
     laws={"resistance_factor": factor},
     plants=("ema", "axis"),
+    limits={"change": NOT_REVERSED},
 )

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from ema import faults
 from ema.core.errors import ConfigError
-from ema.effects import checked, registry
+from ema.effects import known, registry
 from ema.effects.trapezoid import sector, six_step
 
 from . import parts
@@ -85,7 +85,7 @@ def parameters(plant: Actuator, k: np.ndarray, effects: Effects, dT: float | np.
         for parameter in effect.parameters:
             z[row(f"{name}.{parameter.name}")] = parameter.neutral
     try:
-        checked(effects, "ema")
+        known(effects, "ema")
     except ValueError as error:
         raise ConfigError(str(error)) from error
     for name, values in effects.items():

@@ -4,6 +4,7 @@ import pytest
 
 from ema.core import config, resources
 from ema.core.errors import ConfigError
+from ema.models import actuator_file, axis_config
 from ema.models.actuator import Actuator
 
 PLANT = resources.config("actuator.yaml")
@@ -68,3 +69,43 @@ def test_equal_meaning_has_equal_digest(tmp_path):
     plant = config.load(PLANT, Actuator)
     assert config.digest(same) == config.digest(plant)
     assert config.digest(other) != config.digest(plant)
+
+
+CANNOT_BE = [
+    ("gremlins: {size: 1}", "effect 'gremlins' is unknown"),
+    ("cogging: {size: 1}", "effect 'cogging' has no parameter 'size'"),
+    ("cogging: {amplitude: .inf}", "finite"),
+    ("gear_compliance: {compliance: 1e-5, inertia: 0}", "effect 'gear_compliance': inertia = 0 must be above 0"),
+    ("inertia: {change: -1}", "effect 'inertia': change = -1 must be above -1"),
+    ("speed_delay: {time: -1e-3}", "effect 'speed_delay': time = -0.001 must be at least 0"),
+    ("saturation: {emf: -0.01}", "effect 'saturation': emf = -0.01 must be at least 0"),
+]
+
+
+@pytest.mark.parametrize(
+    ("load", "name"),
+    [(actuator_file.load, "actuator.yaml"), (axis_config.load, "laas_mn4004.yaml")],
+    ids=["ema", "axis"],
+)
+@pytest.mark.parametrize(("effect", "says"), CANNOT_BE)
+def test_an_effect_that_cannot_be_simulated_is_refused_with_its_file(tmp_path, load, name, effect, says):
+    path = tmp_path / name
+    text = resources.config(name).read_text()
+    path.write_text(text.replace("effects: {}", f"effects: {{{effect}}}"))
+    with pytest.raises(ConfigError) as error:
+        load(path)
+    for part in (str(path), "'effects", says):
+        assert part in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "effect", ["cogging: {amplitude: 0.3}", "speed_torque: {torque_3: 0.4}", "position_delay: {time: 20e-3}"]
+)
+def test_what_is_only_unlikely_is_accepted(tmp_path, effect):
+    """The library's bounds are where a search looks; a plant may be another one."""
+    actuator_file.load(broken(tmp_path, "effects: {}", f"effects: {{{effect}}}"))
+
+
+def test_a_table_without_width_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="low = 1 must be below high = 1"):
+        actuator_file.load(broken(tmp_path, "effects: {}", "effects: {speed_torque: {low: 1, high: 1}}"))

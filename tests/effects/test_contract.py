@@ -37,9 +37,12 @@ def test_declaration(effect):
     assert effect.said({}) == effect.sentence.format(**effect.neutral())
     assert "{" not in effect.said({p.name: p.start for p in effect.parameters})
     assert effect.separated_by
+    assert set(effect.limits) <= set(effect.neutral())
     for p in effect.parameters:
         assert p.low <= p.neutral <= p.high
         assert p.low <= p.start <= p.high
+        limit = effect.limits.get(p.name)
+        assert limit is None or all(map(limit.holds, (p.low, p.neutral, p.start, p.high)))
         if p.unit not in ("1", "1/turn"):
             convert(p.unit, p.unit)
     for hook, law in effect.laws.items():

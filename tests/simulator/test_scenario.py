@@ -50,6 +50,9 @@ def test_faults_are_functions_of_time(value, at):
         ("actuator: nowhere.yaml", "nowhere.yaml: cannot be read"),
         ("actuators: [{effects: {gremlins: {size: 1}}}]", "effect 'gremlins' is unknown"),
         ("actuators: [{effects: {cogging: {size: 1}}}]", "effect 'cogging' has no parameter 'size'"),
+        ("actuators: [{}, {number: 1, effects: {cogging: {amplitude: .nan}}}]", "actuators.1.effects.*is not finite"),
+        ("actuators: [{effects: {gear_compliance: {inertia: 0}}}]", "inertia = 0 must be above 0"),
+        ("actuators: [{effects: {drive_gain: {gain: 0.1}}}]", "effect 'drive_gain' is unknown; known for kind ema"),
     ],
 )
 def test_a_wrong_scenario_is_refused_in_one_line(write, text, said):

@@ -15,12 +15,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ema.core import config
 from ema.core.records import Record
 from ema.discrepancy.findings import Findings
 from ema.discrepancy.report import Picture
 from ema.identification.alignment import aligned
-from ema.models.actuator import Actuator
+from ema.models import actuator_file
 
 
 def discrepancy(
@@ -31,7 +30,7 @@ def discrepancy(
     from .examine import examine
     from .pictures import pictures
 
-    plant = config.load(plant_file, Actuator)
+    plant = actuator_file.load(plant_file)
     read = [aligned(record, plant) for record in records]
     notes = [note for _, own in read for note in own]
     for note in notes:
