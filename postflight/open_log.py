@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TypeVar
+
+import click
 
 from ema.core.errors import LogError
 from ema.log.foreign import SUFFIXES, ForeignLog
 from ema.log.reader import LogReader, find_logs
 
-from .times import TimeOption
+from .times import TimeOption, limits
+
+Opened = TypeVar("Opened", bound=LogReader | ForeignLog)
 
 
 def open_log(paths: Iterable[Path], start: TimeOption = None, end: TimeOption = None) -> LogReader | ForeignLog:
@@ -32,16 +37,20 @@ def open_log(paths: Iterable[Path], start: TimeOption = None, end: TimeOption = 
     if len(kinds) > 1:
         raise LogError("MCAP logs and logs of other tools cannot be read as one: name one kind only")
     log: LogReader | ForeignLog = LogReader(found) if kinds == {True} else ForeignLog(found)
-    first_ns = log.first_ns() or 0
-    log.start_ns, log.end_ns = (None if t is None else t(first_ns) for t in (start, end))
-    return log
+    return _within(log, start, end)
 
 
 def open_mcap(paths: Iterable[Path], start: TimeOption = None, end: TimeOption = None) -> LogReader:
     """Open MCAP logs only. LogError as `open_log`."""
-    log = LogReader(find_logs(paths, (".mcap",)))
-    first_ns = log.first_ns() or 0
-    log.start_ns, log.end_ns = (None if t is None else t(first_ns) for t in (start, end))
+    return _within(LogReader(find_logs(paths, (".mcap",))), start, end)
+
+
+def _within(log: Opened, start: TimeOption, end: TimeOption) -> Opened:
+    try:
+        log.start_ns, log.end_ns = limits(log.first_ns() or 0, start, end)
+    except click.UsageError:
+        log.close()
+        raise
     return log
 
 

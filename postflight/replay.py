@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from ema.core.errors import LogError
+from ema.core.ranges import FiniteRange
 
 from .times import TimeOption, time_range
 
@@ -25,9 +26,11 @@ _PATH = click.Path(path_type=Path)
 @click.option("--identify", is_flag=True, help="Estimate the faults again, and compare with the log's estimates.")
 @click.option("--channel", multiple=True, metavar="NAME", help="Only this channel of the log (repeatable).")
 @time_range
-@click.option("--speed", type=click.FloatRange(0, min_open=True), default=1, help="With --onto. inf: no waiting.")
+@click.option(
+    "--speed", type=FiniteRange(0, min_open=True, infinite=True), default=1, help="With --onto. inf: no waiting."
+)
 @click.option("--loop", type=click.IntRange(min=0), default=1, help="With --onto. How often; 0: until stopped.")
-@click.option("--skip-gaps", type=click.FloatRange(min=0), metavar="S", help="With --onto. No silence is longer. [s]")
+@click.option("--skip-gaps", type=FiniteRange(min=0), metavar="S", help="With --onto. No silence is longer. [s]")
 @click.option("--id", "ids", multiple=True, metavar="ID", help="With --onto. ID, ID-ID or ID:MASK, hex; ~ inverts.")
 @click.option("--rename", multiple=True, metavar="ID=ID", help="With --onto. Send an identifier as another, hex.")
 @click.option("--bundle", multiple=True, metavar="[N=]DIR", help="With --identify. Not the log's own (for actuator N).")

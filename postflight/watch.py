@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ema.core.ranges import FiniteRange
+
 if TYPE_CHECKING:
     from .live import Live, Shown
 
@@ -19,7 +21,7 @@ _COLOURS = {"VALID": "green", "DEGRADED": "yellow", "INVALID": "red", "NOT_ESTIM
 
 @click.command()
 @click.option("--bus", default="auto", show_default=True, metavar="BUS", help="auto, vcan0, udp_multicast …")
-@click.option("--for", "seconds", type=click.FloatRange(min=0), metavar="S", help="End after so long. [s]")
+@click.option("--for", "seconds", type=FiniteRange(min=0), metavar="S", help="End after so long. [s]")
 def watch(bus: str, seconds: float | None) -> None:
     """Show each actuator's k with status, the daemon's heartbeat, losses and events, twice a second.
 

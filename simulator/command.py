@@ -7,11 +7,13 @@ from typing import Any
 
 import click
 
+from ema.core.ranges import FiniteRange
+
 
 @click.command()
 @click.option("--scenario", "path", required=True, metavar="FILE", help="Scenario YAML.")
 @click.option("--bus", metavar="BUS", help="Instead of the scenario's: auto, vcan0, udp_multicast, virtual:NAME …")
-@click.option("--rate", type=click.FloatRange(0, 1000, min_open=True), help="Scenario time over real time.")
+@click.option("--rate", type=FiniteRange(0, 1000, min_open=True), help="Scenario time over real time.")
 @click.option("--cycles", "n_cycles", type=click.IntRange(min=1), help="Stop after so many test cycles.")
 @click.option("--csv", "csv_path", metavar="FILE", help="Write the records to a CSV file; no bus.")
 @click.option("--actuator", type=int, help="Which one to write with --csv, where the scenario has several.")

@@ -13,11 +13,14 @@ from ema_postflight.recover import recover
 from ema_postflight.replay import replay
 from ema_postflight.report import report
 from ema_postflight.watch import watch
+from ema_simulator.command import simulate
+from ema_simulator.inject import inject
 
 from ema.core.errors import EmaError, LogError
 from ema.log import LogReader, LogSettings
 from ema.log.segmented import SegmentedLog
 
+NO_NUMBER = ("nan", "inf", "-inf")
 COMMANDS = {
     "report": (report, ["--out", "{out}.html"]),
     "export": (export, ["--out", "{out}"]),
@@ -124,6 +127,41 @@ def test_a_bundle_of_another_version_is_refused(command, flight, coarse_bundle, 
     answer = _run(command, sorted(flight.glob("*.mcap"))[0], tmp_path, bundle)
     assert isinstance(answer.exception, EmaError)
     assert "version 9" in str(answer.exception)
+
+
+@pytest.mark.parametrize(
+    ("function", "options"),
+    [
+        *(
+            (f, [option, value])
+            for f in (export, report, replay)
+            for option in ("--start", "--end")
+            for value in NO_NUMBER
+        ),
+        *((replay, ["--onto", "virtual:x", option, "nan"]) for option in ("--speed", "--skip-gaps")),
+        (replay, ["--onto", "virtual:x", "--skip-gaps", "inf"]),
+        *((watch, ["--for", value]) for value in NO_NUMBER),
+        *((simulate, ["--scenario", "x.yaml", "--rate", value]) for value in NO_NUMBER),
+        *((inject, ["--ramp", value]) for value in NO_NUMBER),
+    ],
+)
+def test_what_is_no_finite_number_is_refused(function, options, flight, tmp_path):
+    log = [str(flight)] if function in (export, report, replay) else []
+    out = ["--out", str(tmp_path / "out")] if function in (export, report) else []
+    answer = CliRunner().invoke(function, [*log, *out, *options])
+    assert answer.exit_code == 2
+    assert f"Invalid value for '{options[-2]}'" in answer.output
+
+
+@pytest.mark.parametrize("command", ["report", "export", "export frames", "replay onto", "replay identify"])
+@pytest.mark.parametrize("times", [("100", "1"), ("5", "5"), ("0", "2025-03-14T09:15:00Z")])
+def test_an_end_before_the_start_is_told_as_that(command, times, flight, tmp_path, coarse_bundle):
+    function, options = COMMANDS[command]
+    filled = [option.format(out=tmp_path / "out", bundle=coarse_bundle.path) for option in options]
+    answer = CliRunner().invoke(function, [str(flight), *filled, "--start", times[0], "--end", times[1]])
+    assert answer.exit_code == 2
+    assert "--start must be before --end" in answer.output
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_bus_that_is_not_there_is_told():
