@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import dataclass
+
+import click
 
 from ema.bundle import Bundle
 from ema.bundle import load as load_bundle
@@ -63,7 +65,11 @@ def setup(log: Log, given: tuple[str, ...]) -> Setup:
     configured = configuration(attached)
     named = {int(n): str(one["bundle"]) for n, one in configured.get("actuators", {}).items()}
     chosen = _given(given)
-    numbers = sorted(set(named) | {n for n in chosen if n is not None}) or _actuators_in(log)
+    wanted = {n for n in chosen if n is not None} - set(named)
+    there = set(named) | (set(_actuators_in(log, wanted)) if wanted or not named else set())
+    if absent := sorted(wanted - there):
+        raise click.UsageError(f"--bundle {absent[0]}=…: {names(log.paths)} has no currents of actuator {absent[0]}")
+    numbers = sorted(set(named) | wanted) or sorted(there)
     paths = {n: chosen.get(n) or chosen.get(None) or named.get(n) for n in numbers}
     if missing := [n for n, path in paths.items() if path is None]:
         raise LogError(f"{names(log.paths)}: names no bundle for actuator {missing[0]}: name one with --bundle PATH")
@@ -142,14 +148,19 @@ def _given(given: tuple[str, ...]) -> dict[int | None, str]:
     for text in given:
         number, equals, path = text.partition("=")
         if equals and number.isdecimal():
-            chosen[int(number)] = path
+            who, place = int(number), path
         else:
-            chosen[None] = text
+            who, place = None, text
+        if who in chosen:
+            raise click.UsageError(
+                f"--bundle is given twice for {'all actuators' if who is None else f'actuator {who}'}"
+            )
+        chosen[who] = place
     return chosen
 
 
-def _actuators_in(log: Log) -> list[int]:
-    """Whose currents the first frames of a log hold."""
+def _actuators_in(log: Log, wanted: Set[int] = frozenset()) -> list[int]:
+    """Whose currents the first frames of a log hold; more of them are read until all `wanted` are found."""
     currents = codecs.default().messages["PhaseCurrents"].frame_id
     found: set[int] = set()
     count = 0
@@ -157,7 +168,7 @@ def _actuators_in(log: Log) -> list[int]:
         own = frames["id"][identifiers.message_id(frames["id"]) == currents]
         found |= set(identifiers.actuator(own).tolist())
         count += len(frames)
-        if count > _LOOK_AT:
+        if count > _LOOK_AT and wanted <= found:
             break
     if not found:
         raise LogError(

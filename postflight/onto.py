@@ -26,8 +26,8 @@ class Replayed:
     n_refused: int = 0  # by the bus
     n_unmapped: int = 0  # of a channel that has no bus
     duration: float = 0.0  # [s]
-    latest: float = 0.0  # how much the latest frame was behind its time [s]
-    late: np.ndarray = field(default_factory=lambda: np.zeros(len(_LATE_BINS), int))  # frames by lateness
+    latest: float = 0.0  # how much the latest frame sent was behind its time [s]
+    late: np.ndarray = field(default_factory=lambda: np.zeros(len(_LATE_BINS), int))  # frames sent, by lateness
 
     def late_share(self, limit: float) -> float:
         """Share of frames sent more than `limit` [s] (one of 0.5, 1, 2, 5, 10, 100 ms) after their time."""
@@ -70,8 +70,7 @@ class Replayer:
             while at < len(due) and not self._stop.is_set():
                 now = self._wait(float(due[at]))
                 end = max(at + 1, int(np.searchsorted(due, now + _TOGETHER, side="right")))
-                self._send(ports, traffic.bus[at:end], traffic.frames[at:end])
-                self._note(now - due[at:end])
+                self._send(ports, traffic.bus[at:end], traffic.frames[at:end], now - due[at:end])
                 at = end
             if self._stop.is_set():
                 break
@@ -86,7 +85,7 @@ class Replayer:
             pass
         return self._clock() - self._begin
 
-    def _send(self, ports: list[Port | None], bus: np.ndarray, frames: np.ndarray) -> None:
+    def _send(self, ports: list[Port | None], bus: np.ndarray, frames: np.ndarray, lateness: np.ndarray) -> None:
         for index, port in enumerate(ports):
             own = frames[bus == index]
             if port is None:
@@ -95,6 +94,8 @@ class Replayer:
                 sent = port.write(own)
                 self.done.n_sent += sent
                 self.done.n_refused += len(own) - sent
+                if sent:
+                    self._note(lateness[bus == index][:sent])
 
     def _note(self, lateness: np.ndarray) -> None:
         self.done.latest = max(self.done.latest, float(lateness.max()))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Set
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from ema.core.errors import LogError
 from ema.core.ranges import FiniteRange
@@ -15,6 +17,8 @@ from ema.core.ranges import FiniteRange
 from .times import TimeOption, time_range
 
 _PATH = click.Path(path_type=Path)
+_WITH_ONTO = ("speed", "loop", "skip_gaps", "ids", "rename")
+_WITH_IDENTIFY = ("bundle", "cycles", "out", "processes")
 
 
 @click.command()
@@ -59,6 +63,7 @@ def replay(
 
     if bool(onto) == identify:
         raise click.UsageError("say what for: --onto BUS or --identify")
+    _refuse_given(_WITH_ONTO if identify else _WITH_IDENTIFY, "--onto" if identify else "--identify")
     with open_log(logs, start, end) as log:
         if identify:
             from .reidentify import run
@@ -66,6 +71,14 @@ def replay(
             run(log, how["bundle"], how["channel"], how["cycles"], how["out"], how["processes"], how["as_json"])
         else:
             _send(log, _selection(how["ids"], how["channel"], how["rename"]), onto, how)
+
+
+def _refuse_given(names: tuple[str, ...], only_with: str) -> None:
+    context = click.get_current_context()
+    for name in names:
+        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            option = next(p.opts[0] for p in context.command.params if p.name == name)
+            raise click.UsageError(f"{option} has a meaning with {only_with} only")
 
 
 def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any]) -> None:
@@ -78,13 +91,16 @@ def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any]) 
     from .open_log import names
     from .pacing import Pace
 
+    buses = _buses(onto)
+    if odd := set(buses) - {""} - _channels(log, set(buses) - {""}):
+        there = ", ".join(f"'{channel}'" for channel in sorted(_channels(log))) or "no frame at all"
+        raise LogError(f"{names(log.paths)}: no frame of channel '{min(odd)}' in it (there is: {there})")
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     with ExitStack() as opened:
         ports = {}
-        for text in onto:
-            channel, _, bus = text.rpartition("=")
+        for channel, bus in buses.items():
             ports[channel] = opened.enter_context(open_bus(parse(bus)))
             click.echo(ports[channel].choice, err=True)
         longest = float("inf") if how["skip_gaps"] is None else how["skip_gaps"]
@@ -101,24 +117,44 @@ def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any]) 
         click.echo(f"{damage}", err=True)
     if done.n_sent + done.n_refused + done.n_unmapped == 0 and not stop.is_set():
         raise LogError(f"{names(log.paths)}: no frame in it is chosen")
+    timed = done.n_sent > 0 and how["speed"] < float("inf")  # without waiting no frame has a time
     answer = {
         "sent": done.n_sent,
         "refused": done.n_refused,
         "unmapped": done.n_unmapped,
         "rounds": rounds,
         "duration": done.duration,
-        "latest": done.latest,
-        "late_share_1ms": done.late_share(0.001),
+        "latest": done.latest if timed else None,
+        "late_share_1ms": done.late_share(0.001) if timed else None,
     }
     if how["as_json"]:
         click.echo(json.dumps(answer, indent=2))
         return
-    click.echo(
-        f"{done.n_sent} frames sent in {done.duration:.1f} s; {done.late_share(0.001):.2%} more than 1 ms late, "
-        f"the latest {done.latest * 1e3:.1f} ms"
-    )
+    late = f"; {done.late_share(0.001):.2%} more than 1 ms late, the latest {done.latest * 1e3:.1f} ms" if timed else ""
+    click.echo(f"{done.n_sent} frames sent in {done.duration:.1f} s{late}")
     if done.n_refused or done.n_unmapped:
         click.echo(f"{done.n_refused} refused by the bus, {done.n_unmapped} of channels without a bus")
+
+
+def _buses(onto: tuple[str, ...]) -> dict[str, str]:
+    """Buses by the log's channel, "" for all others."""
+    buses: dict[str, str] = {}
+    for text in onto:
+        channel, _, bus = text.rpartition("=")
+        if channel in buses:
+            raise click.UsageError(f"--onto is given twice for {f'channel {channel!r}' if channel else 'all channels'}")
+        buses[channel] = bus
+    return buses
+
+
+def _channels(log: Any, wanted: Set[str] | None = None) -> set[str]:
+    """Channels of the log; only as many as it takes to have seen all that are `wanted`."""
+    found: set[str] = set()
+    for bus, _ in log.frames() if wanted != set() else ():
+        found.add(bus)
+        if wanted is not None and wanted <= found:
+            break
+    return found
 
 
 def _selection(ids: tuple[str, ...], channels: tuple[str, ...], renames: tuple[str, ...]) -> Any:
@@ -126,11 +162,13 @@ def _selection(ids: tuple[str, ...], channels: tuple[str, ...], renames: tuple[s
 
     renamed = {}
     for text in renames:
-        old, _, new = text.partition("=")
         try:
-            renamed[int(old, 16)] = int(new, 16)
+            old, new = (int(part, 16) for part in text.split("="))
         except ValueError as error:
             raise click.BadParameter(f"{text!r} is not ID=ID in hexadecimal digits", param_hint="--rename") from error
-        if not 0 <= renamed[int(old, 16)] < 2**29:
-            raise click.BadParameter(f"{new!r} has more than 29 bits", param_hint="--rename")
+        if not (0 <= old < 2**29 and 0 <= new < 2**29):
+            raise click.BadParameter(f"{text!r}: an identifier has at most 29 bits", param_hint="--rename")
+        if old in renamed:
+            raise click.BadParameter(f"{old:X} is renamed twice", param_hint="--rename")
+        renamed[old] = new
     return Selection(tuple(IdFilter.parse(text) for text in ids), channels, renamed)

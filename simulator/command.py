@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from pathlib import Path
 from typing import Any
 
 import click
@@ -31,17 +32,38 @@ def simulate(path: str, csv_path: str | None, actuator: int | None, truth: str |
     from . import scenario as scenarios
     from .truth import TruthFile
 
+    _refuse_ignored(csv_path, actuator, **options)
+    if csv_path is not None and truth is not None and Path(csv_path).resolve() == Path(truth).resolve():
+        raise click.UsageError(f"--csv and --truth are the same file {csv_path}")
     scenario, plant = scenarios.load(path)
     scenario = scenarios.override(scenario, **options)
     numbers = [a.number for a in scenario.actuators]
     if csv_path is not None:
         lane = _lane(numbers, actuator)
+        _refuse_record(scenario, csv_path)
     with TruthFile(truth, numbers) if truth else nullcontext() as truth_file:
         on_cycle = truth_file.add if truth_file else lambda cycle: None
         if csv_path is not None:
             _to_csv(scenario, plant, lane, csv_path, on_cycle)
         else:
             _to_bus(scenario, plant, on_cycle)
+
+
+def _refuse_ignored(csv_path: str | None, actuator: int | None, bus: str | None, rate: float | None, **_: Any) -> None:
+    if csv_path is not None and (bus is not None or rate is not None):
+        raise click.UsageError(f"--csv writes a file and no bus: {'--rate' if bus is None else '--bus'} has no meaning")
+    if csv_path is None and actuator is not None:
+        raise click.UsageError("--actuator says which one --csv writes: on a bus are all of them")
+
+
+def _refuse_record(scenario: Any, path: str) -> None:
+    """What would be found only after all cycles have been simulated."""
+    from ema.core.csv_records import refuse_taken
+    from ema.core.errors import ConfigError
+
+    if scenario.n_cycles is None:
+        raise ConfigError("a record needs an end: give the scenario n_cycles, or the command --cycles")
+    refuse_taken(Path(path))
 
 
 def _lane(numbers: list[int], actuator: int | None) -> int:
@@ -56,15 +78,12 @@ def _lane(numbers: list[int], actuator: int | None) -> int:
 def _to_csv(scenario: Any, plant: Any, lane: int, path: str, on_cycle: Any) -> None:
     from ema.bus import codec
     from ema.core.csv_records import write_csv
-    from ema.core.errors import ConfigError
     from ema.core.records import Record
 
     from .injection import FaultSource
     from .node import cycles
     from .to_record import to_cycle
 
-    if scenario.n_cycles is None:
-        raise ConfigError("a record needs an end: give the scenario n_cycles, or the command --cycles")
     written = []
     for cycle in cycles(scenario, plant, FaultSource(scenario, codec.default())):
         on_cycle(cycle)

@@ -36,12 +36,15 @@ def inject(faults: tuple[str, ...], bus: str, actuator: int, ramp: float, key_fi
 
     from .injection import MESSAGE
 
-    wanted = dict.fromkeys(FAULTS, 0.0)
+    given: dict[str, float] = {}
     for word in faults:
         name, _, value = word.partition("=")
-        if name not in wanted:
+        if name not in FAULTS:
             raise click.BadParameter(f"'{word}': the faults are {', '.join(FAULTS)}")
-        wanted[name] = _share(value, word)
+        if name in given:
+            raise click.BadParameter(f"'{word}': {name} is given twice")
+        given[name] = _share(value, word)
+    wanted = dict.fromkeys(FAULTS, 0.0) | given
     # Two frames with numbers from the clock: to a simulator that has heard an earlier call, the first one only says
     # that there is a new sender.
     values = {"k": [list(wanted.values())] * 2, "ramp_time": ramp}

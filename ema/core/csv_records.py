@@ -48,13 +48,21 @@ def read_csv(path: str | Path) -> Record:
     return Record(cycles, path, ignored, resolution)
 
 
+def refuse_taken(path: Path) -> None:
+    """RecordError where no new record can be written: to be asked before the work that it shall hold."""
+    if path.exists():
+        raise RecordError(f"{path}: exists already, is not overwritten")
+    if not path.parent.is_dir():
+        raise RecordError(f"{path}: cannot be written ({path.parent} is no directory)")
+
+
 def write_csv(record: Record, path: str | Path, *, overwrite: bool = False) -> None:
     """Write a record so that reading it gives the same numbers; refuses to replace a file unless told."""
     path = Path(path)
     names = record.channels
     header = ["cycle", *(f"{name} [{CHANNELS[name].unit}]" for name in names)]
-    if path.exists() and not overwrite:
-        raise RecordError(f"{path}: exists already, is not overwritten")
+    if not overwrite:
+        refuse_taken(path)
     try:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
     except OSError as error:

@@ -137,6 +137,17 @@ def test_a_bundle_for_one_actuator_leaves_the_other_as_it_was(recorded, other_bu
     assert methods[7, "linear"]["n_equal"] == 0
 
 
+@pytest.mark.parametrize(
+    ("bundles", "said"),
+    [(["7={0}", "3={0}"], "no currents of actuator 3"), (["7={0}", "7=other"], "twice"), (["{0}", "other"], "twice")],
+)
+def test_a_bundle_that_would_not_be_used_is_refused(recorded, other_bundle, bundles, said):
+    words = [word for text in bundles for word in ("--bundle", text.format(other_bundle.path))]
+    answer = _run(recorded, "--identify", *words)
+    assert answer.exit_code == 2
+    assert said in answer.output
+
+
 def test_a_bundle_built_again_in_the_same_place_is_not_taken_for_the_old_one(
     recorded, coarse_bundle, other_bundle, tmp_path
 ):

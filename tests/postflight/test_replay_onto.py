@@ -111,6 +111,19 @@ def test_one_bus_stays_in_the_order_received():
     assert [i for traffic in merged(batches) for i in traffic.frames["id"]] == [0, 1, 2, 3, 4, 5]
 
 
+def test_only_frames_that_are_sent_can_be_late():
+    """One bus that is not wanted, one that takes the first frame only, and a clock that is a second behind."""
+    clock = _Clock()
+    replayer = Replayer({"a": _FakePort(clock, capacity=1)}, Pace(), clock, clock)
+    replayer.run([FrameBatch("b", _frames([0])), FrameBatch("a", _frames([0, 0, 0]))])
+    clock.now += 1.0
+    done = replayer.run([FrameBatch("a", _frames([0, 0])), FrameBatch("b", _frames([0]))])
+    assert (done.n_sent, done.n_refused, done.n_unmapped) == (2, 3, 2)
+    assert done.late.sum() == 2
+    assert done.late_share(0.001) == 0.5
+    assert done.latest == pytest.approx(1.0)
+
+
 def test_what_the_bus_refuses_is_counted():
     clock = _Clock()
     replayer = Replayer({"": _FakePort(clock, capacity=1)}, Pace(), clock, clock)
@@ -164,7 +177,9 @@ def test_a_log_on_a_bus_is_what_was_logged(flight):
         while message := listener.recv(0):
             received.append((message.arbitration_id, bytes(message.data)))
     assert answer.exit_code == 0, answer.output
-    assert json.loads(answer.stdout)["sent"] == len(received) == 12 * 2 * 7
+    told = json.loads(answer.stdout)
+    assert told["sent"] == len(received) == 12 * 2 * 7
+    assert told["latest"] is told["late_share_1ms"] is None  # without waiting no frame has a time
     with LogReader(flight) as log:
         frames = np.concatenate([b.frames for b in log.frames()])
     assert received == [(int(f["id"]), f["data"][: f["length"]].tobytes()) for f in frames]
@@ -176,5 +191,16 @@ def test_wrong_use_is_told_in_one_line(flight):
 
     assert run().exit_code == 2
     assert "not ID=ID" in run("--onto", "virtual:x", "--rename", "1").output
+    for rename in ("FFFFFFFFF=2", "2=FFFFFFFFF", "-1=2"):
+        assert "at most 29 bits" in run("--onto", "virtual:x", "--rename", rename).output
+    assert "renamed twice" in run("--onto", "virtual:x", "--rename", "1=2", "--rename", "1=3").output
+    assert "given twice" in run("--onto", "virtual:x", "--onto", "virtual:y").output
+    for option in (["--bundle", "b"], ["--cycles", "c.csv"], ["--out", "o.mcap"], ["--processes", "2"]):
+        assert f"{option[0]} has a meaning with --identify only" in run("--onto", "virtual:x", *option).output
+    for option in (["--speed", "1"], ["--loop", "2"], ["--skip-gaps", "1"], ["--id", "1"], ["--rename", "1=2"]):
+        assert f"{option[0]} has a meaning with --onto only" in run("--identify", *option).output
+    absent = run("--onto", "vcan9=virtual:x", "--speed", "inf")
+    assert isinstance(absent.exception, LogError)
+    assert "no frame of channel 'vcan9' in it (there is: 'vcan0')" in str(absent.exception)
     assert isinstance(run("--onto", "virtual:x", "--id", "7FF").exception, LogError)
     assert run("--onto", "virtual:x", "--speed", "0").exit_code == 2

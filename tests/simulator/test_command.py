@@ -40,10 +40,15 @@ def test_a_record_is_written_with_its_truth(write, tmp_path):
     ("text", "words", "said"),
     [
         ("n_cycles: 1\nseed: -1", [], "seed"),
-        ("seed: 1", ["--csv", "x.csv"], "a record needs an end"),
+        ("seed: 1", ["--csv", "x.csv", "--truth", "t.csv"], "a record needs an end"),
         ("n_cycles: 1\nactuators: [{number: 1}, {number: 2}]", ["--csv", "x.csv"], "--actuator"),
         ("n_cycles: 1", ["--bus", "nonsense:x"], "bus nonsense:x cannot be opened"),
         ("n_cycles: 1", ["--rate", "0"], "--rate"),
+        ("n_cycles: 1", ["--csv", "x.csv", "--bus", "virtual"], "--bus has no meaning"),
+        ("n_cycles: 1", ["--csv", "x.csv", "--rate", "2"], "--rate has no meaning"),
+        ("n_cycles: 1", ["--bus", "virtual", "--actuator", "0"], "--actuator says which one"),
+        ("n_cycles: 1", ["--csv", "x.csv", "--truth", "./x.csv"], "--csv and --truth are the same file"),
+        ("n_cycles: 1", ["--csv", "nowhere/x.csv"], "nowhere is no directory"),
         ("n_cycles: 1", ["--truth", "/nowhere/t.csv"], "/nowhere/t.csv: cannot be written"),
     ],
 )
@@ -52,7 +57,16 @@ def test_wrong_use_is_one_line_and_status_2(write, tmp_path, text, words, said):
     assert done.returncode == 2
     assert said in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
-    assert not (tmp_path / "x.csv").exists()
+    assert not list(tmp_path.glob("*.csv"))
+
+
+def test_a_record_that_is_there_already_is_refused_before_any_work(write, tmp_path):
+    """Before the faults' file is begun, and however long the simulation would take."""
+    (tmp_path / "x.csv").write_text("mine")
+    words = ["--csv", "x.csv", "--truth", "t.csv", "--cycles", 1_000_000]
+    done = ema("simulate", "--scenario", write("seed: 1"), *words, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, "ema: x.csv: exists already, is not overwritten\n")
+    assert not (tmp_path / "t.csv").exists()
 
 
 def test_nothing_is_overwritten(write, tmp_path):
@@ -132,9 +146,17 @@ def test_faults_injected_from_another_process_are_taken(write, codec):
             assert faults.at(2.0)[0] == pytest.approx([0.05, 0, k3, 0, 0, 0])
 
 
-@pytest.mark.parametrize(("word", "said"), [("k7=0.1", "the faults are"), ("k3=2", "within 0…1"), ("k3", "within 0…1")])
-def test_wrong_faults_are_refused(word, said):
-    done = ema("inject", word, "--bus", "virtual")
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["k7=0.1"], "the faults are"),
+        (["k3=2"], "within 0…1"),
+        (["k3"], "within 0…1"),
+        (["k1=0.1", "k1=0.2"], "k1 is given twice"),
+    ],
+)
+def test_wrong_faults_are_refused(words, said):
+    done = ema("inject", *words, "--bus", "virtual")
     assert done.returncode == 2
     assert said in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
