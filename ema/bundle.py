@@ -206,7 +206,11 @@ def load(path: str | Path) -> Bundle:
         manifest = json.loads(manifest_path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise BundleError(f"{path}: is not a bundle (no manifest.json); make one with 'ema build'") from error
-    except (OSError, ValueError, RecursionError) as error:
+    except NotADirectoryError as error:
+        raise BundleError(f"{path}: is a file; a bundle is a folder, made with 'ema build'") from error
+    except OSError as error:
+        raise BundleError(f"{manifest_path}: cannot be read ({error.strerror})") from error
+    except (ValueError, RecursionError) as error:
         raise BundleError(f"{manifest_path}: is damaged ({error})") from error
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise BundleError(f"{manifest_path}: is not the manifest of an actuator bundle")

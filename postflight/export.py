@@ -20,7 +20,7 @@ _TABLES = ("estimates", "envelopes", "events", "status")
 _WHAT = (*_TABLES, "signals", "cycles")
 
 
-@click.command()
+@click.command(short_help="Logs as tables, records, or raw logs of other tools.")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--out", metavar="PATH", required=True, type=click.Path(path_type=Path),

@@ -12,7 +12,7 @@ from ema.core.errors import LogError
 _SUFFIX = ".recovered.mcap"
 
 
-@click.command()
+@click.command(short_help="Finished copies of unfinished or damaged logs.")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--out", metavar="DIR", type=click.Path(path_type=Path), help="Where to write (default: beside the log).")
 @click.option("--json", "as_json", is_flag=True, help="Answer for a machine.")

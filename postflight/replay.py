@@ -21,7 +21,7 @@ _WITH_ONTO = ("speed", "loop", "skip_gaps", "ids", "rename")
 _WITH_IDENTIFY = ("bundle", "cycles", "out", "processes")
 
 
-@click.command()
+@click.command(short_help="A log back onto a bus, or through the identifiers again.")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--onto", multiple=True, metavar="BUS",

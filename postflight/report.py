@@ -14,7 +14,7 @@ from .times import TimeOption, time_range
 _PATH = click.Path(path_type=Path)
 
 
-@click.command()
+@click.command(short_help="One page about a flight: health, trends, alarms, remaining life.")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=_PATH)
 @click.option("--out", metavar="FILE", required=True, type=_PATH, help="HTML file to write; not overwritten.")
 @click.option("--config", "config_path", metavar="FILE", type=_PATH, help="Thresholds (default: those shipped).")

@@ -19,7 +19,7 @@ _FULL = 0.3  # k of a full bar
 _COLOURS = {"VALID": "green", "DEGRADED": "yellow", "INVALID": "red", "NOT_ESTIMATED": "bright_black"}
 
 
-@click.command()
+@click.command(short_help="The bus in a terminal: faults, heartbeat, losses, events.")
 @click.option("--bus", default="auto", show_default=True, metavar="BUS", help="auto, vcan0, udp_multicast …")
 @click.option("--for", "seconds", type=FiniteRange(min=0), metavar="S", help="End after so long. [s]")
 def watch(bus: str, seconds: float | None) -> None:

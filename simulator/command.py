@@ -11,7 +11,7 @@ import click
 from ema.core.ranges import FiniteRange
 
 
-@click.command()
+@click.command(short_help="Simulated actuators whose faults grow, on the bus or as a record.")
 @click.option("--scenario", "path", required=True, metavar="FILE", help="Scenario YAML.")
 @click.option("--bus", metavar="BUS", help="Instead of the scenario's: auto, vcan0, udp_multicast, virtual:NAME …")
 @click.option("--rate", type=FiniteRange(0, 1000, min_open=True), help="Scenario time over real time.")

@@ -98,8 +98,8 @@ class Scenario(Settings):
 def load(path: str | Path) -> tuple[Scenario, Actuator]:
     """A scenario and its plant; ConfigError when either is wrong or they do not fit together."""
     scenario = config.load(path, Scenario)
-    beside = Path(path).parent / scenario.actuator
-    plant = actuator_file.load(beside if beside.exists() else resources.config(scenario.actuator))
+    beside, shipped = Path(path).parent / scenario.actuator, resources.config(scenario.actuator)
+    plant = actuator_file.load(shipped if shipped.exists() and not beside.exists() else beside)
     least = plant.motion.duration + scenario.return_time + scenario.stagger * (len(scenario.actuators) - 1)
     if scenario.period < least:
         raise ConfigError(

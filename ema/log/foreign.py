@@ -14,6 +14,7 @@ from ema.core.errors import LogError
 from .reader import FrameBatch, Paths, find_logs
 
 SUFFIXES = (".asc", ".blf", ".csv", ".db", ".log", ".mf4", ".trc")
+_NO_FRAMES = "a CSV log has a row timestamp,arbitration_id,extended,remote,error,dlc,data for each frame"
 _BATCH = 512
 
 
@@ -86,4 +87,5 @@ def _messages(path: Path) -> Iterator[Any]:
     except (NotImplementedError, ImportError) as error:
         raise LogError(f"{path}: needs a package that is not installed ({error}); try ema-monitor[logs]") from error
     except Exception as error:  # parsers of text and binary formats let anything through on a damaged file
-        raise LogError(f"{path}: is damaged or not what its name says ({type(error).__name__}: {error})") from error
+        why = _NO_FRAMES if _suffix(path) == ".csv" else f"{type(error).__name__}: {error}"
+        raise LogError(f"{path}: is damaged or not what its name says ({why})") from error

@@ -42,6 +42,7 @@ def test_a_sound_bundle_loads_as_it_was_saved(small_bundle):
     ("damage", "says"),
     [
         (lambda p: shutil.rmtree(p), "no manifest.json"),
+        (lambda p: (shutil.rmtree(p), p.write_text("kind: ema")), "is a file; a bundle is a folder"),
         (lambda p: (p / "manifest.json").write_text("{"), "damaged"),
         (lambda p: (p / "manifest.json").write_text("[]"), "not the manifest"),
         (lambda p: edited(p, format="other"), "not the manifest"),

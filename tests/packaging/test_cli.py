@@ -25,6 +25,13 @@ def test_help_lists_every_subcommand():
     assert result.exit_code == 0
     for name in COMMANDS:
         assert name in result.output
+    assert "..." not in result.output.partition("Commands:")[2], "a summary is cut off"
+
+
+@pytest.mark.parametrize("name", ["export", "replay", "report"])
+def test_a_time_is_explained_where_it_is_first_asked_for(name):
+    text = " ".join(CliRunner().invoke(cli, [name, "--help"]).output.split())
+    assert text.index("--start T") < text.index("seconds from the log's beginning") < text.index("likewise")
 
 
 def test_the_version_is_that_of_logs():

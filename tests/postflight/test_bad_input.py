@@ -118,6 +118,14 @@ def test_a_truncated_log_is_read_as_far_as_it_goes(flight, tmp_path, coarse_bund
         assert answer.exit_code == 0, (n, answer.output, answer.exception)
 
 
+def test_a_record_given_as_a_log_of_frames_is_told_what_is_wanted(tmp_path):
+    (tmp_path / "record.csv").write_text("t [s],i_a [A],i_b [A]\n0,1,2\n")
+    answer = CliRunner().invoke(replay, [str(tmp_path / "record.csv"), "--onto", "virtual:bad"])
+    assert isinstance(answer.exception, LogError)
+    assert "timestamp,arbitration_id" in str(answer.exception)
+    assert "ValueError" not in str(answer.exception)
+
+
 @pytest.mark.parametrize("command", ["replay identify", "identify"])
 def test_a_bundle_of_another_version_is_refused(command, flight, coarse_bundle, tmp_path):
     bundle = tmp_path / "bundle"

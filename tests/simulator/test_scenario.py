@@ -61,6 +61,13 @@ def test_a_wrong_scenario_is_refused_in_one_line(write, text, said):
     assert "\n" not in str(caught.value)
 
 
+def test_a_plant_that_is_missing_is_named_where_it_was_meant(tmp_path, write):
+    path = write("actuator: plants/mine.yaml")
+    with pytest.raises(ConfigError) as error:
+        load(path)
+    assert str(error.value).startswith(f"{tmp_path / 'plants/mine.yaml'}: cannot be read")
+
+
 def test_the_command_line_has_the_last_word(write):
     scenario, _ = load(write("rate: 2\nn_cycles: 5\n"))
     changed = override(scenario, bus="virtual:x", rate=None, n_cycles=7)
