@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from ema.core.errors import ConfigError, NoCycleError, RecordError
+from ema.core.folders import make_folder
 from ema.core.records import Record
 
 # Which module examines which kind of plant.
@@ -57,10 +58,7 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
     for path in (findings_file, report, extended):
         if path.exists():
             raise ConfigError(f"{path}: exists, and is not overwritten; choose another --out")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"{out}: cannot be made ({error.strerror})") from error
+    make_folder(out)
     console = Console(stderr=True)
     with console.status("simulating") as status:
 
@@ -88,12 +86,12 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
 
 def _read(paths: Sequence[Path]) -> tuple[list[Record], list[str]]:
     """The records, of directories every log in them, and what is said of logs without a whole cycle beside others."""
-    from ema.core.records import read_record
+    from ema.core.records import each_once, read_record
     from ema.log.reader import find_logs
 
     found: list[Record] = []
     empty: list[NoCycleError] = []
-    for path in (p for given in paths for p in (find_logs(given, (".mcap",)) if given.is_dir() else [given])):
+    for path in each_once(p for given in paths for p in (find_logs(given, (".mcap",)) if given.is_dir() else [given])):
         try:
             found.append(read_record(path))
         except NoCycleError as error:

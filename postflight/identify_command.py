@@ -31,14 +31,14 @@ def identify(bundle: Path, method: str, as_json: bool, records: tuple[Path, ...]
     """
     import ema.bundle
     from ema.core.errors import NegativeAnswer, RecordError
-    from ema.core.records import read_record
+    from ema.core.records import each_once, read_record
     from ema.core.status import Status
     from ema.identification import identifier
     from ema.identification.alignment import aligned
     from ema.identification.recorded import measurements, missing
 
     made = ema.bundle.load(bundle)
-    read = [aligned(read_record(path), made.plant) for path in records]
+    read = [aligned(read_record(path), made.plant) for path in each_once(records)]
     sets = [(record, notes, measurements(record, made.plant, made.schedule)) for record, notes in read]
     estimator = identifier(method, made)
     answers: list[dict[str, Any]] = []

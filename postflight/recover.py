@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from ema.core.errors import LogError
+from ema.core.folders import make_folder
 
 _SUFFIX = ".recovered.mcap"
 
@@ -29,10 +30,7 @@ def recover(logs: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
     from ema.log.reader import find_logs
 
     if out is not None:
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise LogError(f"{out}: cannot be made ({error.strerror})") from error
+        make_folder(out)
     answers = []
     failures = []
     for path in find_logs(logs, (".mcap",)):

@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -117,6 +117,16 @@ def read_record(path: str | Path) -> Record:
     if not path.exists():
         raise RecordError(f"{path}: no such file")
     return _reader(path.suffix.lower())(path)
+
+
+def each_once(paths: Iterable[Path]) -> list[Path]:
+    """The records' files; RecordError for one given twice, which would count as evidence of its own."""
+    found: dict[Path, Path] = {}
+    for path in paths:
+        if path.resolve() in found:
+            raise RecordError(f"{path}: is given twice (a folder stands for every log in it)")
+        found[path.resolve()] = path
+    return list(found.values())
 
 
 def _reader(suffix: str) -> Callable[[Path], Record]:

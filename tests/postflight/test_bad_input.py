@@ -7,6 +7,7 @@ import can
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from ema_postflight.discrepancy import discrepancy
 from ema_postflight.export import export
 from ema_postflight.identify_command import identify
 from ema_postflight.recover import recover
@@ -16,10 +17,12 @@ from ema_postflight.watch import watch
 from ema_simulator.command import simulate
 from ema_simulator.inject import inject
 
+from ema.core import resources
 from ema.core.errors import EmaError, LogError
 from ema.log import LogReader, LogSettings
 from ema.log.segmented import SegmentedLog
 
+PLANT = str(resources.config("actuator.yaml"))
 NO_NUMBER = ("nan", "inf", "-inf")
 COMMANDS = {
     "report": (report, ["--out", "{out}.html"]),
@@ -116,6 +119,18 @@ def test_a_truncated_log_is_read_as_far_as_it_goes(flight, tmp_path, coarse_bund
     for command in ("report", "export", "recover"):
         answer = _run(command, cut, tmp_path, coarse_bundle.path)
         assert answer.exit_code == 0, (n, answer.output, answer.exception)
+
+
+@pytest.mark.parametrize("command", ["recover", "discrepancy"])
+def test_a_folder_that_cannot_be_made_is_told(command, flight, tmp_path):
+    (tmp_path / "taken").write_text("mine")
+    function, more = {"recover": (recover, []), "discrepancy": (discrepancy, ["--plant", PLANT])}[command]
+    record = tmp_path / "record.csv"
+    record.write_text("t [s],i_a [A]\n0,1\n1,2\n")
+    given = str(flight if command == "recover" else record)
+    answer = CliRunner().invoke(function, [given, *more, "--out", str(tmp_path / "taken")])
+    assert isinstance(answer.exception, EmaError)
+    assert str(answer.exception) == f"{tmp_path / 'taken'}: cannot be made (File exists)"
 
 
 def test_a_record_given_as_a_log_of_frames_is_told_what_is_wanted(tmp_path):

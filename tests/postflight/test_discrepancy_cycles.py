@@ -51,6 +51,17 @@ def log(directory, flight, bundle):
             out.frames(frames, "vcan0")
 
 
+def test_a_record_given_twice_is_refused(fly, coarse_bundle, tmp_path):
+    """On its own and in its folder it would be taken as two that agree."""
+    log(tmp_path, fly(n_cycles=2, seed=4), coarse_bundle)
+    (segment,) = tmp_path.glob("*.mcap")
+    with pytest.raises(RecordError, match=r"\.mcap: is given twice \(a folder stands for every log in it\)"):
+        _read([tmp_path, segment])
+    with pytest.raises(RecordError, match="is given twice"):
+        _read([segment, segment])
+    assert len(_read([segment])[0]) == 1
+
+
 def test_a_directory_stands_for_the_logs_in_it_and_one_without_a_cycle_is_left_out(fly, coarse_bundle, tmp_path):
     with pytest.raises(LogError, match="holds no log"):
         _read([tmp_path])

@@ -55,6 +55,14 @@ def test_every_method_finds_small_faults(coarse_bundle, cycle, tmp_path, method)
     assert answer["records"][0]["missing_channels"] == []
 
 
+def test_a_record_given_twice_is_refused(coarse_bundle, cycle, tmp_path):
+    path = written(tmp_path, cycle)
+    (tmp_path / "same.csv").symlink_to(path)
+    for again in (path, tmp_path / "." / "record.csv", tmp_path / "same.csv"):
+        with pytest.raises(RecordError, match="is given twice"):
+            run(coarse_bundle, path, str(again))
+
+
 def test_missing_channels_are_said_and_widen_the_answer(coarse_bundle, cycle, tmp_path):
     bare = {name: x for name, x in cycle.items() if name in ("t", "i_a", "i_b", "i_c")}
     answer = json.loads(run(coarse_bundle, written(tmp_path, bare), "--json").stdout)["records"][0]
