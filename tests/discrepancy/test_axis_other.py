@@ -4,21 +4,34 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.between import examined
 from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.weak_form import weak_form
 from ema.models.axis_config import LinearAxis, RotaryAxis
 
 
 def look(axis_other, name, *, held=False, **hidden):
-    setup = replace(axis_other.SETUPS[name], held=held)
+    return look_at(axis_other, replace(axis_other.SETUPS[name], held=held), **hidden)
+
+
+def with_angles(record, change):
+    """The record with its angles through a function."""
+    return Record(tuple(Cycle(c.number, {**c.channels, "theta_m": change(c["theta_m"])}) for c in record))
+
+
+def look_at(axis_other, setup, *, angles=None, fitted=(), **hidden):
     values = [0.0] * 8
     for key, value in hidden.items():
         values[getattr(axis_other, key)] = value
     setup = replace(setup, hidden=tuple(values))
     model = LinearAxis if setup.motion == "linear" else RotaryAxis
-    return examined(AxisPlant(model.model_validate(axis_other.plant(setup)), [axis_other.record(setup, 1)]))
+    record = axis_other.record(setup, 1)
+    plant = model.model_validate({**axis_other.plant(setup), "fitted": list(fitted)})
+    return examined(AxisPlant(plant, [with_angles(record, angles) if angles else record]))
 
 
 def test_a_stage_with_nothing_hidden_is_adequate_though_its_encoder_counts(axis_other):
@@ -75,3 +88,60 @@ def test_what_the_library_lacks_is_not_named(axis_other):
     outcome = look(axis_other, "stage", EVEN=0.1)
     assert outcome.verdict == "unexplained"
     assert all(e["confidence"] < 0.9 for e in outcome.effects)
+
+
+def test_friction_that_falls_fast_with_speed_is_named_though_motion_cannot_be_foretold_for_long(axis_other):
+    """Deviations grow thirtyfold in a tenth of a second; windows of 0.4 s and a start elsewhere had missed it."""
+    setup = replace(axis_other.BASE, inertia=8e-5, F_d=0.028, F_s=0.045, w_stribeck=7.0, motions=SLOW)
+    (found,) = look_at(axis_other, setup, fitted=["J"]).effects
+    assert found["name"] == "stribeck"
+    assert found["confidence"] > 0.9
+    assert found["parameters"]["excess"]["value"] == pytest.approx(0.045 / 0.028 - 1.0, rel=0.1)
+
+
+SLOW = ((12, 0.5, 0), (20, 0.8, 0), (30, 1.3, 0), (15, 2, 10), (25, 0.7, -12))
+
+
+@pytest.mark.parametrize(("own", "name"), [(True, "encoder_error"), (False, "resolver_error")])
+def test_an_angle_sensor_off_centre_is_told_with_or_without_a_speed_sensor_of_its_own(axis_other, own, name):
+    setup = axis_other.BASE if own else replace(axis_other.SETUPS["encoder"], counts=0.0)
+    found = look_at(axis_other, setup, angles=lambda x: x + 0.012 * np.sin(x + 1.1)).effects[0]
+    assert found["name"] == name
+    assert found["indistinguishable_from"] == []
+    assert found["parameters"]["once_cosine"]["value"] == pytest.approx(0.012 * np.sin(1.1), rel=0.05)
+    assert found["parameters"]["once_sine"]["value"] == pytest.approx(0.012 * np.cos(1.1), rel=0.05)
+
+
+def test_turns_that_were_counted_are_no_torque(axis_other):
+    """Of an angle a thousand turns on, sums that are not exactly zero had made torques of many newton metres."""
+    setup = axis_other.SETUPS["encoder"]
+    model, record = RotaryAxis.model_validate(axis_other.plant(setup)), axis_other.record(setup, 1)
+    here, there = (
+        AxisPlant(model, [with_angles(record, lambda x, turns=turns: x + 2.0 * np.pi * turns)]) for turns in (0, 1000)
+    )
+    point = {f.name: f.start for f in here.base}
+    a, b = (weak_form(plant, point, range(len(plant.blocks))) for plant in (here, there))
+    np.testing.assert_allclose(a.y, b.y, atol=0.02 * float(a.sigma.min()))
+
+
+def test_a_mass_that_swings_on_its_spring_needs_little_force_and_shows_all_of_the_spring(axis_other):
+    setup = replace(
+        axis_other.SETUPS["stage"], inertia=0.5, F_d=0.3, F_s=0.3, C=0.5, gains=(0.0, 3.0), motions=AT_RESONANCE
+    )  # fmt: skip
+    found = look_at(axis_other, setup, SPRING=380.0).effects[0]
+    assert found["name"] == "spring_load"
+    assert found["parameters"]["stiffness"]["value"] == pytest.approx(380.0, rel=0.02)
+    assert found["parameters"]["stiffness"]["unit"] == "N/m"
+    assert "380 N/m" in found["sentence"]
+
+
+AT_RESONANCE = ((0.3, 4.3, 0), (0.5, 4.0, 0), (0.4, 5.0, 0), (0.3, 3.6, 0))
+
+
+def test_noise_that_is_a_little_more_than_declared_is_no_cause(axis_other):
+    setup = axis_other.BASE
+    declared = {"theta_m": 0.94 * 2e-4, "w_m": 0.94 * 0.05, "i_q": 0.94 * 5e-3, "u_q": 0.94 * 0.02}
+    plant = RotaryAxis.model_validate({**axis_other.plant(setup), "noise": declared})
+    outcome = examined(AxisPlant(plant, [axis_other.record(setup, 1)]))
+    assert outcome.verdict == "adequate"
+    assert outcome.effects == []
