@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from ema.core.errors import RecordError
-from ema.core.names import FAULTS
+from ema.core.names import CURRENTS, FAULTS
 from ema.core.records import Cycle, Record, require
+from ema.effects.base import T_REFERENCE
 from ema.models.actuator import Actuator
 from ema.models.envelope import envelope
 from ema.models.turns import nearest_turn
@@ -20,8 +21,7 @@ from .features import Array, Signals, features, motor_torque, stacked
 from .sampling import between, positions_every
 from .zeros import zero_apart
 
-REQUIRED = ("t", "i_a", "i_b", "i_c", "theta_m", "theta_u", "theta_cmd")
-T_20 = 20.0  # [°C] temperature of the nominal parameters
+REQUIRED = ("t", *CURRENTS, "theta_m", "theta_u", "theta_cmd")
 MIN_DURATION = 0.2  # [s]
 MAX_LAG = 6e-3  # [s] no sensor or loop of this plant is that late; channels are apart
 MAX_CLIPPED = 0.1  # share of samples at the largest value
@@ -113,7 +113,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
             record,
             REQUIRED,
             min_samples=int(MIN_DURATION * plant.control.rate),
-            varying=("theta_cmd", "theta_m", "theta_u", "i_a", "i_b", "i_c"),
+            varying=("theta_cmd", "theta_m", "theta_u", *CURRENTS),
         )
         for cycle in record.cycles:
             where = f"{record.name}: {cycle}"
@@ -133,7 +133,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
     start = np.column_stack([user[:, 0], [s.theta_m[0, 0] for s in signals]])
     holding = np.array([s.i[0, :, :rest].mean(axis=1) for s in signals])
     speed = np.array([_speed_at_start(s.theta_m[0], plant.control.rate) for s in signals])
-    dT = np.array([cycle["temp_w"].mean() - T_20 if with_temperature else 0.0 for _, cycle in everything])
+    dT = np.array([cycle["temp_w"].mean() - T_REFERENCE if with_temperature else 0.0 for _, cycle in everything])
     return Measured(
         tuple(labels),
         commands,
@@ -159,7 +159,7 @@ def _signals(cycle: Cycle, with_supply: bool, GR: float) -> Signals:
     theta_m = np.unwrap(cycle["theta_m"])
     theta_m += nearest_turn(cycle["theta_u"][0], theta_m[0], GR)
     return Signals(
-        np.stack([cycle["i_a"], cycle["i_b"], cycle["i_c"]])[None],
+        np.stack([cycle[name] for name in CURRENTS])[None],
         theta_m[None],
         cycle["theta_u"][None],
         cycle["theta_cmd"][None],
@@ -250,9 +250,9 @@ def _check_motion(where: str, s: Signals, plant: Actuator) -> None:
     for name, x in (("theta_cmd", s.theta_cmd), ("theta_m", s.theta_m), ("theta_u", s.theta_u)):
         if np.ptp(x) == 0.0:
             raise RecordError(f"{where}: {name} is constant; a cycle in motion is needed")
-    for j, phase in enumerate("abc"):
+    for j, name in enumerate(CURRENTS):
         if np.ptp(s.i[0, j]) <= 6.0 * plant.sensors.current_noise:
-            raise RecordError(f"{where}: i_{phase} is constant; a cycle under current is needed")
+            raise RecordError(f"{where}: {name} is constant; a cycle under current is needed")
     x, y = s.theta_m[0] / plant.transmission.GR, s.theta_u[0]
     x, y = x - x.mean(), y - y.mean()
     slope = float(x @ y) / float(x @ x)
@@ -265,13 +265,13 @@ def _check_motion(where: str, s: Signals, plant: Actuator) -> None:
 
 def _check_clipping(where: str, s: Signals, plant: Actuator) -> None:
     step = plant.sensors.adc_step
-    for j, phase in enumerate("abc"):
+    for j, name in enumerate(CURRENTS):
         x = np.abs(s.i[0, j])
         top = float(x.max())
         share = float(np.mean(x >= top - 0.5 * step))
         if top >= plant.sensors.adc_range - 1.5 * step or (share > MAX_CLIPPED and top > 0.5):
             raise RecordError(
-                f"{where}: i_{phase} is clipped at {top:.3g} A in {share:.1%} of its samples (ADC range "
+                f"{where}: {name} is clipped at {top:.3g} A in {share:.1%} of its samples (ADC range "
                 f"±{plant.sensors.adc_range:g} A); a record with less current or a wider range is needed"
             )
 

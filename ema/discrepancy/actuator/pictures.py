@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ema.discrepancy.report import Picture, picture
+from ema.effects.base import T_REFERENCE
 
 from .examine import Examination
 from .features import GROUPS, SECTORS, Array
@@ -199,7 +200,7 @@ def _temperature(e: Examination, torques: list[list[Torque]]) -> list[Picture]:
     figure = Figure(figsize=(5.0, 2.8))
     ax = figure.subplots()
     for cycles, colour in zip(torques, (BEFORE, AFTER), strict=False):
-        ax.plot(data.dT + 20.0, [1e3 * float(np.sqrt(np.mean(c.r**2))) for c in cycles], "o", color=colour)
+        ax.plot(data.dT + T_REFERENCE, [1e3 * float(np.sqrt(np.mean(c.r**2))) for c in cycles], "o", color=colour)
     ax.set_xlabel("winding temperature [°C]")
     ax.set_ylabel("residual torque, rms [mN m]")
     return [picture("Residual against temperature", "One dot for each cycle.", figure)]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ema.core.names import FAULTS
+from ema.core.names import FAULTS, PHASES
 from ema.effects import registry
 from ema.models import hf
 from ema.models.actuator import Actuator
@@ -110,7 +110,7 @@ class EmaPlant:
         start[:, STATE.index("w_m")] = d.speed[cycles_]
         start[:, STATE.index("w_u")] = d.user_speed[cycles_]
         legs = self._legs(points, cycles_)
-        for j, phase in enumerate("abc"):  # the current that held it before
+        for j, phase in enumerate(PHASES):  # the current that held it before
             start[:, STATE.index(f"s_{phase}")] = legs[:, j]
             for name in ("i", "lag1", "lag2"):
                 start[:, STATE.index(f"{name}_{phase}")] = d.holding[cycles_, j]

@@ -26,6 +26,7 @@ FORM = 0.5  # of a value, for a rest as large as the whole effect: the interval 
 NAMED = 0.95  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
 UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: a rest is left that nothing explains, or
 LITTLE = 2.0  # what faults alone leave is no more than this excess, which two effects together nearly always explain
+LOUD, MOST = 1.3, 0.5  # misfit of a cycle that shows a rest; share of it that is worth a word
 ENVELOPE_SETTLING = 15e-3  # [s]
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
 NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none
@@ -63,6 +64,8 @@ def told(search: Search, before: Model, after: Model, v: Verdict, alike: list[tu
             f"{', '.join(e.name for e in found)} would explain {share:.0%} of the rest: too little to be named"
         )
         found = []
+    if verdict == "unexplained":
+        notes += _recorded_once(search, after)
     for c in odd:
         at, amplitude = (after.fit.point[f"{c.effect}.{name}"] for name in ("order", "amplitude"))
         notes.append(f"a torque line at the non-integer order {at:.4g} is no cogging of this motor")
@@ -78,6 +81,24 @@ def told(search: Search, before: Model, after: Model, v: Verdict, alike: list[tu
         unnamed = [replace(unnamed[0], sentence=f"a further {registry()['cogging'].said(values)}")]
         notes.append(f"beside it stands {unnamed[0].sentence}")
     return Findings(verdict, found, _gain(search, before, after), shape, tried, notes, unnamed=unnamed)
+
+
+def _recorded_once(search: Search, model: Model) -> list[str]:
+    """A rest that only motions show of which no cycle could be held out, and what would take it there."""
+    data, held = search.plant.data, {int(search.plant.data.motion[c]) for c in search.heldout}
+    loud = [c for c in search.train if search.noise.misfit([model.fit.residuals[c]], [c]) > LOUD]
+    if model.excess > CHANCE or not loud or any(int(data.motion[c]) in held for c in loud):
+        return []
+    best = min(
+        (m for m in search.tried if len(m.effects) > len(model.effects)), key=lambda m: m.fit.misfit, default=model
+    )
+    share = 1.0 - _left_in_training(model, best)
+    perhaps = f" ({' + '.join(best.names)} would take {share:.0%} of it)" if share > MOST else ""
+    where = ", ".join(data.labels[c] for c in loud)
+    return [
+        f"what is left{perhaps} shows only in {where}: a motion recorded once, so that no cause could be tried on a "
+        "cycle that it was not fitted to; record it again"
+    ]
 
 
 def _left_in_training(before: Model, after: Model) -> float:

@@ -11,6 +11,7 @@ from scipy.signal import savgol_filter
 
 from ema.core.errors import RecordError
 from ema.core.records import Array, Cycle, Record
+from ema.effects.base import T_REFERENCE
 from ema.models.axis_config import Axis
 
 from .channels import MIN_SAMPLES, Roles, roles
@@ -19,7 +20,6 @@ from .noise import SIMULATED_TO, Noise, estimate, is_derived
 HALF = 5  # samples on each side of a local quadratic
 GLITCH = 12.0  # noise amplitudes by which a step of position may miss the speed before the window is cut there
 MAX_SAMPLES = 12_000  # of one record
-AMBIENT = 20.0  # [°C]
 STATIC_SAMPLES = 250
 MIN_WINDOW = 16  # samples
 AT_REST = 3.0  # noise amplitudes of the smoothed speed below which nothing is seen to move
@@ -123,7 +123,7 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
         speed = savgol_filter(raw, 2 * width - 1, 2, deriv=1, delta=dt)
     if who.position is None:
         raw = smooth = np.concatenate(([0.0], np.cumsum(np.diff(t) * 0.5 * (speed[1:] + speed[:-1]))))
-    dT = float(np.mean(cycle["temp_w"])) - AMBIENT if "temp_w" in cycle else 0.0
+    dT = float(np.mean(cycle["temp_w"])) - T_REFERENCE if "temp_w" in cycle else 0.0
     cuts = _glitches(cycle, who, noise) if who.position is not None and who.speed is not None else np.array([], int)
     gaps = np.flatnonzero(np.diff(t) > 5.0 * dt) + 1
     still = np.abs(speed) < AT_REST * START_NOISE * speed_noise(who, noise, dt)
