@@ -30,6 +30,7 @@ def reproduce(out: Path, config_path: Path | None, workers: int | None) -> None:
     from ema.core import resources
     from ema.core.config import digest
     from ema.core.errors import ConfigError
+    from ema.core.folders import make_folder
     from ema.core.version import version
 
     from . import build, experiments, reproduction_figures, reproduction_page
@@ -38,10 +39,7 @@ def reproduce(out: Path, config_path: Path | None, workers: int | None) -> None:
 
     builder, plant = build.read(config_path or resources.config("builder.yaml"))
     builder = builder.model_copy(update={"schedule": Schedule()})  # the paper's, whatever else is in use
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"{out}: cannot be used as output folder ({error.strerror})") from error
+    make_folder(out)
     click.echo(f"seeds: builder {builder.seed}, experiments {experiments.SEED}", err=True)
     path = out / "bundle"
     if not path.exists():
