@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,8 +17,10 @@ from .features import GROUPS, SECTORS, Array
 from .plant import ENVELOPE_STEP, Point
 from .select import FINAL_SEED, N_FINAL
 from .telling import settled
+from .thinning import spread
 from .weak import ORDERS, Torque, line, share_explained, torque
 
+N_SHOWN = 3  # cycles side by side
 BEFORE, AFTER, NOISE = "#c0392b", "#1f6fb2", "#b9bec6"
 
 
@@ -37,11 +40,16 @@ def pictures(e: Examination) -> list[Picture]:
 
 
 def _shown(e: Examination) -> list[int]:
-    """A held-out cycle of each motion."""
+    """A held-out cycle of each motion that has one; of many motions a few, spread over the record."""
     motions = e.search.plant.data.motion
-    return [
-        next((c for c in e.search.heldout if motions[c] == m), e.search.plant.first[m]) for m in sorted(set(motions))
-    ]
+    first = {int(motions[c]): c for c in reversed(e.search.heldout)}
+    return spread(np.array(sorted(first.values())), N_SHOWN).tolist()
+
+
+def _title(label: str) -> str:
+    """File and cycle of a cycle's label."""
+    record, _, cycle = label.rpartition(": ")
+    return f"{Path(record).stem[-24:]}, {cycle}" if record else cycle
 
 
 def _labels(points: Sequence[Point]) -> list[tuple[str, str]]:
@@ -50,7 +58,7 @@ def _labels(points: Sequence[Point]) -> list[tuple[str, str]]:
 
 def _envelope(e: Examination, cycles: list[int], points: list[Point]) -> Picture:
     plant = e.search.plant
-    figure = Figure(figsize=(9.0, 4.6))
+    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     axes = figure.subplots(2, len(cycles), squeeze=False, sharex="col")
     for column, c in enumerate(cycles):
         measured = plant.data.envelopes[c][::ENVELOPE_STEP]
@@ -65,12 +73,12 @@ def _envelope(e: Examination, cycles: list[int], points: list[Point]) -> Picture
             bottom.plot(t, measured - mean, color=colour, lw=0.8)
         largest = np.abs(np.array(bottom.lines[0].get_ydata(), dtype=float)[settled(plant) : -2]).max()
         bottom.set_ylim(-1.2 * largest, 1.2 * largest)
-        top.set_title(f"held-out: {plant.data.labels[c].split(': ')[-1]}", fontsize=9)
+        top.set_title(_title(plant.data.labels[c]), fontsize=9)
         bottom.set_xlabel("t [s]")
     axes[0, 0].set_ylabel("envelope [A]")
     axes[1, 0].set_ylabel("measured less\nsimulated [A]")
-    axes[0, 0].legend(fontsize=8)
-    axes[1, 0].legend(fontsize=8)
+    axes[0, -1].legend(fontsize=8, loc="upper left")
+    axes[1, -1].legend(fontsize=8, loc="upper left")
     return picture("Envelope current in time", "Held-out cycles, which no parameter was fitted on.", figure)
 
 
