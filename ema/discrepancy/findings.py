@@ -133,12 +133,15 @@ SEEN = 1.05  # times the noise, where a rest beside a cause is worth a word
 
 
 def _said(effect: FoundEffect) -> str:
-    """The effect's sentence with its reservations."""
+    """The effect's sentence with its reservations; those in a set share what is sure of it."""
+    others = effect.indistinguishable_from
+    odds = effect.confidence * (1 + len(others))
     text = effect.sentence[0].upper() + effect.sentence[1:]
-    if effect.indistinguishable_from:
-        text += f" (or {' or '.join(effect.indistinguishable_from)}; told apart by {effect.separated_by})"
-    elif effect.confidence < SURE:
-        text = f"Perhaps, with a confidence of {effect.confidence:.0%} only: {effect.sentence}"
+    if odds < SURE:
+        text = f"Perhaps, with a confidence of {odds:.0%} only: {effect.sentence}"
+    if others:
+        text += f" (or {' or '.join(others)}; told apart by {effect.separated_by})"
+    elif odds < SURE:
         text += f" (to be confirmed by {effect.separated_by})"
     return text + "."
 

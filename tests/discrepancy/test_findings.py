@@ -8,7 +8,7 @@ from ema_postflight.discrepancy import discrepancy
 
 from ema.core import resources
 from ema.core.errors import ConfigError
-from ema.discrepancy.findings import Findings, Gain
+from ema.discrepancy.findings import Findings, FoundEffect, Gain
 
 GAIN = Gain(0.1, 0.1, 0.1, 0.1, 0.1)
 
@@ -27,6 +27,17 @@ def test_a_rest_beside_a_cause_is_told_where_it_can_be_seen():
     (rest,) = Findings("explained", [], GAIN, rest=2.0).sentences()
     assert "2 times the noise" in rest
     assert Findings("explained", [], GAIN, rest=2.0).as_dict()["rest"] == 2.0
+
+
+def test_a_set_is_as_sure_as_its_members_together():
+    def said(confidence, *others):
+        effect = FoundEffect("spring_load", confidence, others, {}, "a spring", "slow motion")
+        return Findings("explained", [effect], GAIN).sentences()[0]
+
+    assert said(0.95) == "A spring."
+    assert said(0.6) == "Perhaps, with a confidence of 60% only: a spring (to be confirmed by slow motion)."
+    assert said(0.49, "inertia") == "A spring (or inertia; told apart by slow motion)."
+    assert said(0.1, "inertia").startswith("Perhaps, with a confidence of 20% only: a spring (or inertia;")
 
 
 def test_what_was_found_before_is_not_overwritten(tmp_path):
