@@ -60,7 +60,7 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
     notes: list[str] = []
     _select(plant, state, progress)
     _revise(plant, state, progress)
-    _without_unlikely(plant, state, progress)
+    trust = _without_unlikely(plant, state, progress)
     plain = state.plain
     verdict = _judged(plant, plain)
     progress("final fit")
@@ -85,7 +85,7 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
         verdict=outcome,
         because=verdict.because,
         p_value=verdict.p_value,
-        effects=_effects(plant, state, final.point, final.draw),
+        effects=_effects(plant, state, trust, final.point, final.draw),
         structure=plant.describe_structure(terms, final.point) if outcome == "unexplained" else {},
         train=_gain(plant, plain, state.model, held_out=False),
         heldout=_gain(plant, plain, state.model, held_out=True),
@@ -237,38 +237,36 @@ def _without(point: Point, candidate: Candidate, base: set[str]) -> Point:
     return {name: value for name, value in point.items() if name in base or name not in own}
 
 
-def _without_unlikely(plant: Plant, state: _State, progress: Progress) -> None:
-    """Leave out effects that are no causes: what they explain is a rest without a name.
+def _without_unlikely(plant: Plant, state: _State, progress: Progress) -> dict[str, float]:
+    """Leave out effects that are no causes: what they explain is a rest without a name. The trust in those that stay.
 
     These are the unlikeliest together with all that the data cannot tell from them, and, where much stays unexplained,
     those that lean on the bounds of what is credible.
     """
     while True:
-        accepted = [c for c in state.model.accepted if not c.is_structure]
-        trust = _trust(plant, state) if accepted else {}
+        trust = _trust(plant, state)
         explained = _is_explained(plant, state.plain, state.model)
         odds = {}
         for c, (trials, before) in zip(state.model.accepted, state.rounds, strict=True):
-            if c in accepted:
+            if not c.is_structure:
                 weights = _weights(trials, before)
                 told = {c.key, *(key for key in alike(trials, c.key, before) if key in weights)}
                 no_cause = not explained and any(_leans(fitted, c) for fitted in state.model.fits)
                 odds[c.key] = 0.0 if no_cause else trust[c.key] * sum(weights[key] for key in told)
         worst = min(odds, key=lambda key: odds[key], default=None)
         if worst is None or odds[worst] >= UNLIKELY:
-            return
+            return trust
         progress(f"without {worst}, which is unlikely")
         k = [c.key for c in state.model.accepted].index(worst)
         state.model = _leave_out(plant, state.model, {k})
         del state.rounds[k]
 
 
-def _effects(plant: Plant, state: _State, point: Any, draw: Any) -> list[dict[str, Any]]:
+def _effects(plant: Plant, state: _State, trust: dict[str, float], point: Any, draw: Any) -> list[dict[str, Any]]:
     accepted = state.model.accepted
     named = [c for c in accepted if not c.is_structure]
     if not named:
         return []
-    trust = _trust(plant, state)
     rounds = dict(zip((c.key for c in accepted), state.rounds, strict=True))
     out = []
     for entry in plant.describe(named, point, draw):
@@ -308,6 +306,8 @@ def _trust(plant: Plant, state: _State) -> dict[str, float]:
     """
     accepted = state.model.accepted
     terms = {k for k, c in enumerate(accepted) if c.is_structure}
+    if len(terms) == len(accepted):
+        return {}
     nameless = _leave_out(plant, state.model, terms) if terms else state.model
     unknown = 0.0 if _judged(plant, nameless).is_noise else above_noise(nameless)
     marks = {

@@ -14,7 +14,7 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.models.axis_config import LinearAxis
 
 from .naming import line
-from .weak_form import Weak, weak_form
+from .weak_form import FEWEST, Weak, thinned, weak_form
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 MAX_ORDER = 240
 MAX_LINES = 8
 MIN_LINE = 0.03  # of the strongest line: weaker ones are not worth a name
-MAX_ROWS = 2500
 ALARM = 1e-4  # of a line that is not there, over all orders
 
 
@@ -70,13 +69,6 @@ def scan(weak: Weak, orders: Array, max_lines: int = MAX_LINES, alarm: float = A
     return Scan(tuple(float(orders[k]) for k in chosen), found, float(coefficients[A.shape[1] - 1]))
 
 
-def thinned(weak: Weak) -> Weak:
-    """At most `MAX_ROWS` test functions, evenly."""
-    if len(weak.y) <= MAX_ROWS:
-        return weak
-    return weak[np.unique(np.linspace(0, len(weak.y) - 1, MAX_ROWS).astype(int))]
-
-
 def _orthonormal(A: Array) -> Array:
     u, s, _ = np.linalg.svd(A / np.maximum(np.linalg.norm(A, axis=0), 1e-300), full_matrices=False)
     return np.asarray(u[:, s > 1e-8 * s[0]])
@@ -104,7 +96,7 @@ def cogging_candidate(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> 
         return None
     weak = thinned(weak_form(plant, point, blocks))
     orders = integer_orders(weak)
-    if len(orders) == 0 or len(weak.y) < 30:
+    if len(orders) == 0 or len(weak.y) < FEWEST:
         return None
     taken = {float(name.split(":")[1].rpartition(".")[0]) for name in point if name.startswith("cogging:")}
     found = scan(weak, np.array([n for n in orders if n not in taken]))

@@ -18,8 +18,7 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 from ema.effects.stribeck import factor
 
-from .cogging import thinned
-from .weak_form import Weak, weak_form
+from .weak_form import FEWEST, Weak, thinned, weak_form
 
 if TYPE_CHECKING:
     from .candidates import Sizes
@@ -30,7 +29,6 @@ SPEEDS = np.geomspace(0.02, 1.0, 12)  # of the rms speed
 SHAPES = (0.0, 0.5, 1.0)
 HIGHEST = 3.0  # excess
 LEAST = 1e-3  # of a column that must be left beside the others
-FEWEST = 30  # test functions
 N_STARTS = 4
 
 _factor = njit(factor)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-SAID = {  # the longest first: each is replaced where no longer one was
+import re
+
+SAID = {  # of those that begin alike the longest first
     "N m s²/rad²": "N s²/m²",
     "N m s^2/rad^2": "N s^2/m^2",
     "N m s/rad": "N s/m",
@@ -21,10 +23,4 @@ SAID = {  # the longest first: each is replaced where no longer one was
 
 def in_metres(text: str) -> str:
     """A sentence or a unit with metres for radians and newtons for newton metres."""
-    if not text:
-        return text
-    for rotary, linear in SAID.items():
-        before, found, after = text.partition(rotary)
-        if found:
-            return in_metres(before) + linear + in_metres(after)
-    return text
+    return re.sub("|".join(map(re.escape, SAID)), lambda found: SAID[found[0]], text)

@@ -9,9 +9,9 @@ from scipy import stats
 
 from ema.models.axis_config import LinearAxis
 
-from .cogging import ALARM, integer_orders, scan, thinned
-from .fading import FEWEST, SPEEDS, fadings
-from .weak_form import Weak, weak_form
+from .cogging import ALARM, integer_orders, scan
+from .fading import SPEEDS, fadings
+from .weak_form import FEWEST, Weak, thinned, weak_form
 from .windows import Bench
 
 if TYPE_CHECKING:

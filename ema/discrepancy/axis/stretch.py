@@ -11,8 +11,7 @@ from ema.core.records import Array
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 
-from .cogging import thinned
-from .weak_form import weak_form
+from .weak_form import FEWEST, thinned, weak_form
 
 if TYPE_CHECKING:
     from .candidates import Sizes
@@ -29,7 +28,7 @@ def stretch_candidate(plant: AxisPlant, s: Sizes, point: Point, blocks: Sequence
     if any(name.startswith(NAME) for name in point):
         return None
     weak = thinned(weak_form(plant, point, blocks))
-    if len(weak.y) < 30:
+    if len(weak.y) < FEWEST:
         return None
     q, rest = weak.beside()
     theta, way = weak.motion.theta, np.sign(weak.motion.direction)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .plant import AxisPlant
 
 HALF_WIDTHS = (3, 5, 8, 12, 20, 32, 50)  # of a test function, in samples
+FEWEST, MAX_ROWS = 30, 2500  # test functions with which regressions are worth it, and with which they stay quick
 QUIET = 0.2  # noise of y over the drive torque at which a test function is wide enough
 
 
@@ -125,6 +126,13 @@ def weak_form(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> Weak:
     join = [np.concatenate([getattr(p, name) for p in pieces]) for name in ("y", "sigma", "inertia", "block")]
     y, sigma, inertia, block = join
     return Weak(y, sigma, inertia, motion, index, weight, block.astype(int))
+
+
+def thinned(weak: Weak) -> Weak:
+    """At most `MAX_ROWS` test functions, evenly."""
+    if len(weak.y) <= MAX_ROWS:
+        return weak
+    return weak[np.unique(np.linspace(0, len(weak.y) - 1, MAX_ROWS).astype(int))]
 
 
 def _piece(y: Array, sigma: Array, inertia: Array, index: np.ndarray, weight: Array, block: int) -> Weak:
