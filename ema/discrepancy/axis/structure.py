@@ -17,8 +17,7 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects.torque_term import COLUMNS, EVEN, NEUTRAL
 
 from .candidates import Sizes, sizes
-from .cogging import thinned
-from .weak_form import Motion, Weak, weak_form
+from .weak_form import FEWEST, Motion, Weak, thinned, weak_form
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -43,7 +42,7 @@ class Term:
 def search(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candidate]:
     """The best member of each family, the one that explains most first."""
     weak = thinned(weak_form(plant, point, blocks))
-    if len(weak.y) < 30:
+    if len(weak.y) < FEWEST:
         return []
     m = weak.motion
     q, rest = weak.beside()

@@ -16,7 +16,6 @@ from ema.core.records import Array
 from ema.models.axis_config import LinearAxis
 
 from .cogging import integer_orders, scan, thinned
-from .weak_form import weak_form
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -53,7 +52,7 @@ def _lines(plant: AxisPlant, name: str) -> dict[float, complex]:
     """z_n by order. [N m]"""
     weak = thinned(weak_form(plant, {}, [j for j, w in enumerate(plant.windows) if w.group == name]))
     orders = integer_orders(weak)
-    if len(orders) == 0 or len(weak.y) < 30:
+    if len(orders) == 0 or len(weak.y) < FEWEST:
         return {}
     found = scan(weak, orders)
     return {n: complex(c, -s) for n, (c, s) in zip(found.orders, found.parts, strict=True)}
