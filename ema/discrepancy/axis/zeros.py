@@ -15,7 +15,8 @@ import numpy as np
 from ema.core.records import Array
 from ema.models.axis_config import LinearAxis
 
-from .cogging import integer_orders, scan, thinned
+from .cogging import integer_orders, scan
+from .weak_form import FEWEST, thinned, weak_form
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
