@@ -75,7 +75,7 @@ def parameters(plant: Actuator, k: np.ndarray, effects: Effects, dT: float | np.
     for section, names in (
         (m, ("p", "theta_0", "phi", "J_m", "C")),
         (inv, ("V_dc", "h", "I_max")),
-        (g, ("GR", "theta_stop")),
+        (g, ("GR", "mobility", "theta_stop")),
         (c, ("K_p", "K_w")),
         (s, ("lvdt_step", "f_lag")),
     ):

@@ -30,8 +30,8 @@ THETA_M, W_M, THETA_U, W_U, U_DC, ANGLE_ERROR, I_REF = map(
 )
 THETA_0 = row("theta_0")
 R_A, R_B, R_C, L_A, L_B, L_C, K_A, K_B, K_C = (row(f"{x}_{j}") for x in "RLk" for j in PHASES)
-P, ZETA, PHI, V_DC, H, I_MAX, J_M, C, F_S, F_D, GR, B, THETA_STOP = map(
-    row, ("p", "zeta", "phi", "V_dc", "h", "I_max", "J_m", "C", "F_s", "F_d", "GR", "b", "theta_stop")
+P, ZETA, PHI, V_DC, H, I_MAX, J_M, C, F_S, F_D, GR, B, MOBILITY, THETA_STOP = map(
+    row, ("p", "zeta", "phi", "V_dc", "h", "I_max", "J_m", "C", "F_s", "F_d", "GR", "b", "mobility", "theta_stop")
 )
 K_P, K_W, LVDT_STEP, F_LAG, DT = map(row, ("K_p", "K_w", "lvdt_step", "f_lag", "dT"))
 E_ELECTRIC, E_COPPER, E_SHAFT, E_FRICTION, E_USER = map(
@@ -184,14 +184,15 @@ def mechanical_step(z, l, N, dt, tau_m, parts, audited):
     w_next = 0.0 if abs(theta_next) > limit else w_next
     theta_next = min(max(theta_next, -limit), limit)
 
+    crept = theta_u - dt * z[MOBILITY * N + l] * tau_user  # of a user that friction does not hold within the gap
     if len(parts) & GEAR:
         w_u_next = w_u + dt / J_u * (tau_gear - tau_user)
         theta_soft = min(max(theta_u + w_u_next * dt, -stop), stop)
         w_u_next = w_u_next if abs(theta_soft) < stop else 0.0
         z[W_U * N + l] = w_u_next if soft else w_next / gr
-        theta_u_next = theta_soft if soft else min(max(follow(theta_u, theta_next / gr, b), -stop), stop)
+        theta_u_next = theta_soft if soft else min(max(follow(crept, theta_next / gr, b), -stop), stop)
     else:
-        theta_u_next = min(max(follow(theta_u, theta_next / gr, b), -stop), stop)
+        theta_u_next = min(max(follow(crept, theta_next / gr, b), -stop), stop)
     z[THETA_M * N + l], z[W_M * N + l], z[THETA_U * N + l] = theta_next, w_next, theta_u_next
 
     if len(audited):

@@ -27,6 +27,7 @@ PARAMETERS = (
         "F_d",
         "GR",
         "b",
+        "mobility",
         "theta_stop",
         "K_p",
         "K_w",

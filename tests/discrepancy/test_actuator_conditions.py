@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter1d
 
+from ema.core import config, resources
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.conditions import as_recorded, current_noise, position_noise, supply_voltage
 from ema.discrepancy.actuator.cycles import measured
@@ -15,7 +16,10 @@ from ema.discrepancy.actuator.examine import examine
 from ema.discrepancy.actuator.fit import excess_at
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
+from ema.discrepancy.actuator.play import FREE, is_pressed
 from ema.discrepancy.actuator.zeros import zero_apart
+from ema.discrepancy.extended import write_extended
+from ema.models.actuator import Actuator
 
 
 @pytest.fixture(scope="module")
@@ -223,3 +227,39 @@ def test_late_comparators_that_went_on_switching_at_rest_do_so_in_the_simulation
     truth = {"comparator_delay.time": 2.91e-6, "k5": 0.0225, "k6": 0.0209}
     plant = EmaPlant(as_recorded(shipped_plant, data.signals)[0], data)
     assert excess_at(plant, Noise(plant, truth), truth, [1]) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("flaws", "pressed"),
+    [
+        ({}, False),
+        ({"k2": 0.04}, False),
+        ({"load": 3.0}, False),
+        ({"spring": 1500.0, "k2": 0.03}, False),
+        ({"compliance": 2e-5, "user_damping": 30.0}, False),
+        ({"once_sine": 0.01}, False),
+        ({"load": 3.0, "holding": 0.5}, True),
+        ({"load": -2.0, "holding": 0.5, "k2": 0.05}, True),
+        ({"spring": 400.0, "holding": 0.2}, True),
+        ({"spring": 1500.0, "holding": 0.5, "k2": 0.03}, True),
+    ],
+)
+def test_a_load_that_presses_the_user_to_one_side_of_the_play_is_seen(hidden, shipped_plant, flaws, pressed):
+    assert is_pressed(shipped_plant, prepared(shipped_plant, hidden.cycles(hidden.Flaws(**flaws), 2, 5))) is pressed
+
+
+@pytest.mark.slow
+def test_a_spring_that_closes_the_play_is_named_and_the_extended_plant_has_a_user_that_gives_way(
+    hidden, shipped_plant, tmp_path
+):
+    """With a play that stays where it was pushed, the truth itself left two hundred times the noise."""
+    cycles = hidden.cycles(hidden.Flaws(spring=1800.0, holding=0.5, k1=0.03), 4, 3)
+    findings = examine(shipped_plant, prepared(shipped_plant, cycles)).findings
+    assert findings.verdict == "explained"
+    (found,) = findings.effects
+    assert (found.name, found.indistinguishable_from) == ("spring_load", ())
+    assert found.parameters["stiffness"].value == pytest.approx(1800.0, rel=0.01)
+    assert findings.gain.k_after == pytest.approx((0.03, 0.0, 0.0, 0.0, 0.0, 0.0), abs=3e-3)
+    write_extended(resources.config("actuator.yaml"), findings.effects, tmp_path / "extended.yaml", findings.fitted)
+    extended = config.load(tmp_path / "extended.yaml", Actuator)
+    assert extended.transmission == shipped_plant.transmission.model_copy(update={"mobility": FREE})

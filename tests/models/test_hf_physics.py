@@ -118,6 +118,18 @@ def flat_tops() -> tuple[np.ndarray, np.ndarray]:
     return np.where(np.abs(np.sin(x)) > 0.5, np.sign(np.sin(x)), 0.0), clear
 
 
+@pytest.mark.parametrize("torque", [3.0, -3.0])
+def test_a_load_moves_a_user_that_friction_does_not_hold_to_its_side_of_the_gap(torque):
+    gaps = []
+    for plant in (PLANT, varied(transmission={"mobility": 1.0})):
+        r = hf.simulate(plant, np.zeros(6), effects={"constant_load": {"torque": torque}}, noise=False)
+        gaps.append((r.theta_m / plant.transmission.GR - r.theta_u)[0, 500:])
+    held, pressed = gaps
+    assert np.ptp(held) > 2.0 * PLANT.transmission.b
+    side = np.copysign(PLANT.transmission.b, torque)
+    assert np.abs(pressed - side).max() < 0.51 * PLANT.sensors.lvdt_step
+
+
 def test_torque_is_two_k_e_I_at_every_angle():
     _, clear = flat_tops()
     assert np.allclose(shaft_torque(np.zeros(6))[clear], 2 * PLANT.motor.k_e * 5.0, rtol=0.01)

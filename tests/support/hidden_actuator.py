@@ -54,6 +54,7 @@ class Flaws(NamedTuple):
     cogging_phase: float = 0.0
     load: float = 0.0  # [N m at the user]
     spring: float = 0.0  # [N m/rad at the user]
+    holding: float = 1e9  # [N m] friction at the user: a load beyond it presses the user to one side of the play
     compliance: float = 0.0  # [rad/(N m)] with the user's own inertia and a viscous damper
     user_inertia: float = 0.6
     user_damping: float = 0.0  # [N m s/rad]
@@ -303,6 +304,8 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
                 theta_u += dt * w_u
             else:
                 theta_u = min(max(theta_u, theta / GR - b), theta / GR + b)
+                if abs(gear_torque) > f.holding:
+                    theta_u = theta / GR - math.copysign(b, gear_torque)
                 w_u = faster / GR
             mech[2], mech[3] = theta_u, w_u
 

@@ -101,6 +101,10 @@ CASES: dict[str, Case] = {
                           parameters={"constant_load.torque": lambda f: f["load"]}),
     "spring_load": Case(_one("spring", 300.0, 2000.0), ("spring_load",),
                         parameters={"spring_load.stiffness": lambda f: f["spring"]}),
+    "constant_load on a free user": Case(_one("load", 1.0, 6.0, signed=True, holding=0.5), ("constant_load",),
+                                         parameters={"constant_load.torque": lambda f: f["load"]}),
+    "spring_load on a free user": Case(_one("spring", 300.0, 2000.0, holding=0.5), ("spring_load",),
+                                       parameters={"spring_load.stiffness": lambda f: f["spring"]}),
     "gear_compliance": Case(_one("compliance", 5e-6, 3e-5, user_damping=30.0), ("gear_compliance",),
                             parameters={"gear_compliance.compliance": lambda f: f["compliance"]}),
     "supply_sag": Case(_one("source_resistance", 0.05, 0.4), ("supply_sag",),
@@ -135,7 +139,7 @@ CASES: dict[str, Case] = {
 
 # Singly not seen in every record: beside another effect their absence from an answer would say nothing.
 SELDOM_SEEN = ("clock_skew", "adc_saturation", "saturation", "winding_resistance")
-COMMON = [name for name, c in CASES.items() if len(c.effects) == 1 and name not in SELDOM_SEEN]
+COMMON = [name for name, c in CASES.items() if c.effects == (name,) and name not in SELDOM_SEEN]
 
 
 PAIRS = ("cogging + viscous_drag", "magnet_flux + current_offset")  # tried with every seed

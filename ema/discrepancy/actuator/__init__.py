@@ -5,8 +5,8 @@ the cycles at any point of faults and effects; `noise` says what two runs differ
 `fit` is Gauss–Newton on simulated means; `weak` and `candidates` say what to try, `select` tries it, `structure`
 describes what is left, `examine` is the whole run, `pictures` shows it. Of the run, `paths` are its ways, `forward`
 adds effects, `weighing` says whether one is real, `verdicts` makes sure, `simpler` prefers fewer causes, `telling`
-puts the model into findings. Before it `conditions`, `comparators`, `timing`, `sampling` and `zeros` read what is
-no flaw of the actuator, `growing` whether its faults change.
+puts the model into findings. Before it `conditions`, `comparators`, `timing`, `sampling`, `play` and `zeros` read
+what is no flaw of the actuator, `growing` whether its faults change.
 """
 
 from __future__ import annotations

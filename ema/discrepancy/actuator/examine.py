@@ -18,6 +18,7 @@ from .growing import beside, growing, said, widened
 from .noise import Noise, Verdict
 from .paths import faults_only, gone_on, resume, shortest, with_faults
 from .plant import EmaPlant
+from .play import as_held, with_mobility
 from .select import Model, Search
 from .simpler import (
     simpler,
@@ -71,11 +72,12 @@ def examine(
             f"{data.labels[0]}: is the only cycle; at least {MIN_CYCLES} are needed, to test on one what another says"
         )
     data, left_out = thinned(data)
+    stated = plant
     train, heldout = split(data)
     plant, conditions = as_recorded(plant, data.signals)
     if left_out:
         conditions.append(left_out)
-    data = swinging(plant, data)
+    plant, data = as_held(plant, swinging(plant, data))
     ema = EmaPlant(plant, data, n_threads)
     say("switching noise")
     search = Search(ema, Noise(ema, {}), train, heldout, say)
@@ -131,4 +133,5 @@ def examine(
     if path.step:
         conditions.append(f"the comparators of the record switch as if evaluated every {1e6 * path.step:g} µs")
     findings.notes.extend(conditions)
+    findings = with_mobility(stated, plant, findings)
     return Examination(findings, search, before, after, path.verdict_before, v)
