@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from ema.bundle import Bundle
 from ema.bundle import load as load_bundle
 from ema.bus import codec
+from ema.bus.identifiers import N_ACTUATORS
 from ema.bus.interface import BusSettings
 from ema.core import config
 from ema.core.config import Settings
@@ -23,7 +24,7 @@ from ema.monitor import MonitorSettings
 from .sinks import estimate_message
 
 LOCAL = ("linear", "lf2")  # identifiers that are small enough for the daemon's own process
-Number = Annotated[int, Field(ge=0, le=63)]
+Number = Annotated[int, Field(ge=0, lt=N_ACTUATORS)]
 
 
 class ActuatorSettings(Settings):
@@ -57,6 +58,9 @@ class DaemonSettings(Settings):
         for method in self.monitor.slower:
             if method in METHODS and method not in LOCAL and method not in self.remote:
                 raise ValueError(f"identifier '{method}' needs a process of its own: remote.{method} is its socket")
+        idle = sorted(set(self.remote) - set(self.monitor.slower))
+        if idle:
+            raise ValueError(f"remote.{idle[0]} is never asked: monitor.slower does not name '{idle[0]}'")
         return self
 
     @model_validator(mode="after")

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import click
 
+from ema.bus.identifiers import N_ACTUATORS
 from ema.core.ranges import FiniteRange
 
 
 @click.command(short_help="Tell a simulated actuator to grow faults.")
 @click.argument("faults", nargs=-1, metavar="FAULT=VALUE…")
 @click.option("--bus", default="auto", show_default=True, metavar="BUS", help="auto, vcan0, udp_multicast …")
-@click.option("--actuator", type=click.IntRange(0, 63), default=0, show_default=True)
+@click.option("--actuator", type=click.IntRange(0, N_ACTUATORS - 1), default=0, show_default=True)
 @click.option("--ramp", type=FiniteRange(0, 655), default=0.0, show_default=True, help="Time to get there [s].")
 @click.option("--key-file", type=click.Path(path_type=Path), help="Of a bus whose frames are authenticated.")
 def inject(faults: tuple[str, ...], bus: str, actuator: int, ramp: float, key_file: Path | None) -> None:

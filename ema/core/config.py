@@ -24,7 +24,10 @@ class Settings(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _number_with_unit(cls, value: Any, info: ValidationInfo) -> Any:
-        extra = cls.model_fields[info.field_name or ""].json_schema_extra
+        field = cls.model_fields[info.field_name or ""]
+        if isinstance(value, bool) and field.annotation in (float, int):
+            raise ValueError("is no number")  # which Python takes it for
+        extra = field.json_schema_extra
         if isinstance(value, str) and isinstance(extra, dict) and "unit" in extra:
             return to_unit(value, str(extra["unit"]))
         return value

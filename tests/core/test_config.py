@@ -35,6 +35,8 @@ def test_numbers_carry_their_units():
         ("R: 1.065 ohm", "r: 1.065", ["motor.R", "missing"]),
         ("R: 1.065 ohm", "R: 1\n  R: 2", ["given twice", "line"]),
         ("p: 2 ", "p: 2.5 ", ["motor.p"]),
+        ("p: 2 ", "p: true ", ["motor.p", "True", "no number"]),
+        ("R: 1.065 ohm", "R: yes", ["motor.R", "True", "no number"]),
         ("F_s: 0.04 N m", "F_s: 0.01 N m", ["transmission", "F_s", "F_d"]),
         ("motor:", "engine:", ["motor", "missing"]),
         ("kind: ema", "kind: axis", ["kind", "axis"]),

@@ -46,6 +46,7 @@ def test_a_good_configuration_is_not_refused(write_config):
         ({"monitor": {"slower": {"lf2": {"every": 0}}}}, "greater than or equal to 0.01"),
         ({"monitor": {"slower": {"magic": {"every": 1}}}}, "identifier 'magic' is unknown"),
         ({"monitor": {"slower": {"lf1": {"every": 5}}}, "remote": {"lf1": "lf1.sock"}}, "no message for .* 'lf1'"),
+        ({"remote": {"hf": "hf.sock"}}, "remote.hf is never asked: monitor.slower does not name 'hf'"),
         ({"monitor": {"model_check": {"cycles": 2, "failures": 3}}}, "can never happen"),
     ],
 )
