@@ -56,6 +56,17 @@ def test_desynchronised(good, shipped_plant):
         measured(shipped_plant, [record(changed(good, **late))])
 
 
+@pytest.mark.parametrize("factor", [0.5, 0.8, 1.25, 3.0])
+def test_other_gains_of_the_controller_are_no_lack_of_synchrony(good, shipped_plant, factor):
+    """Wrong gains turn the phase of what the controller should ask for; that is something to find, not to refuse."""
+    control = shipped_plant.control.model_copy(update={"K_p": factor * shipped_plant.control.K_p})
+    other = shipped_plant.model_copy(update={"control": control})
+    measured(other, [record(good)])
+    late = {name: np.roll(good[name], 200) for name in ("i_a", "i_b", "i_c")}
+    with pytest.raises(RecordError, match="not synchronised"):
+        measured(other, [record(changed(good, **late))])
+
+
 def test_another_plant(good, shipped_plant):
     with pytest.raises(RecordError, match="another plant"):
         measured(shipped_plant, [record(changed(good, theta_m=0.2 * good["theta_m"]))])

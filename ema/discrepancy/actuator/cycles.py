@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from ema.core.errors import RecordError
 from ema.core.names import CURRENTS, FAULTS
 from ema.core.records import Cycle, Record, require
 from ema.effects.base import T_REFERENCE
@@ -17,14 +16,13 @@ from ema.models.actuator import Actuator
 from ema.models.envelope import envelope
 from ema.models.turns import nearest_turn
 
-from .features import Array, Signals, features, motor_torque, stacked
+from .checks import check_rate, check_signals
+from .features import Array, Signals, features, stacked
 from .sampling import between, positions_every
 from .zeros import zero_apart
 
 REQUIRED = ("t", *CURRENTS, "theta_m", "theta_u", "theta_cmd")
 MIN_DURATION = 0.2  # [s]
-MAX_LAG = 6e-3  # [s] no sensor or loop of this plant is that late; channels are apart
-MAX_CLIPPED = 0.1  # share of samples at the largest value
 AT_REST_SPEED = 0.1  # [rad/s]
 START_SAMPLES = 10
 HIDDEN = 2e-5  # [rad rms] noise of the rotor angle that its own motion hides
@@ -117,11 +115,9 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
         )
         for cycle in record.cycles:
             where = f"{record.name}: {cycle}"
-            _check_rate(where, cycle, plant)
+            check_rate(where, cycle, plant)
             s = _signals(cycle, with_supply, plant.transmission.GR)
-            _check_motion(where, s, plant)
-            _check_clipping(where, s, plant)
-            _check_synchrony(where, s, plant)
+            check_signals(where, s, plant)
             labels.append(where)
             everything.append((s, cycle))
     signals = [s for s, _ in everything]
@@ -235,84 +231,3 @@ def _white_noise(channels: Sequence[Array]) -> float:
     step = _step(np.concatenate(list(channels)))
     white = np.sqrt(max(rms**2 - step**2 / 12.0, 0.0))
     return float(white) if white > max(HIDDEN, step) else 0.0
-
-
-def _check_rate(where: str, cycle: Cycle, plant: Actuator) -> None:
-    rate = 1.0 / cycle.period
-    if abs(rate / plant.control.rate - 1.0) > 0.03:
-        raise RecordError(f"{where}: is sampled at {rate:.4g} Hz, the plant's recorder at {plant.control.rate:.4g} Hz")
-    longest = float(np.diff(cycle["t"]).max())
-    if longest > 1.5 * cycle.period:
-        raise RecordError(f"{where}: has a gap of {longest:.3g} s (samples are {cycle.period:.3g} s apart)")
-
-
-def _check_motion(where: str, s: Signals, plant: Actuator) -> None:
-    for name, x in (("theta_cmd", s.theta_cmd), ("theta_m", s.theta_m), ("theta_u", s.theta_u)):
-        if np.ptp(x) == 0.0:
-            raise RecordError(f"{where}: {name} is constant; a cycle in motion is needed")
-    for j, name in enumerate(CURRENTS):
-        if np.ptp(s.i[0, j]) <= 6.0 * plant.sensors.current_noise:
-            raise RecordError(f"{where}: {name} is constant; a cycle under current is needed")
-    x, y = s.theta_m[0] / plant.transmission.GR, s.theta_u[0]
-    x, y = x - x.mean(), y - y.mean()
-    slope = float(x @ y) / float(x @ x)
-    if not 1.0 / 3.0 < slope < 3.0:  # a compliant gear may resonate, a wrong ratio is further off
-        raise RecordError(
-            f"{where}: θ_u moves {slope:.3g} times θ_m/GR with the plant's GR = {plant.transmission.GR:g}: "
-            "a record of another plant, or a wrong unit or sign"
-        )
-
-
-def _check_clipping(where: str, s: Signals, plant: Actuator) -> None:
-    step = plant.sensors.adc_step
-    for j, name in enumerate(CURRENTS):
-        x = np.abs(s.i[0, j])
-        top = float(x.max())
-        share = float(np.mean(x >= top - 0.5 * step))
-        if top >= plant.sensors.adc_range - 1.5 * step or (share > MAX_CLIPPED and top > 0.5):
-            raise RecordError(
-                f"{where}: {name} is clipped at {top:.3g} A in {share:.1%} of its samples (ADC range "
-                f"±{plant.sensors.adc_range:g} A); a record with less current or a wider range is needed"
-            )
-
-
-def _check_synchrony(where: str, s: Signals, plant: Actuator) -> None:
-    """Channels that belong together must not be apart by more than any sensor or loop can be late."""
-    rate = plant.control.rate
-    reach = int(0.05 * rate)
-    tau = motor_torque(plant, s)[0][0]
-    w_m = np.gradient(s.theta_m[0], 1.0 / rate)
-    c = plant.control
-    I_ref = np.clip(
-        c.K_w * (c.K_p * (s.theta_cmd[0] - s.theta_u[0]) - w_m), -plant.inverter.I_max, plant.inverter.I_max
-    )
-    slow = ", or the current control is far slower than the plant file's"
-    pairs = (
-        ("the currents", "position and command", tau, I_ref, slow),
-        ("θ_u", "θ_m", s.theta_u[0], s.theta_m[0], ""),
-    )
-    for late, early, x, y, or_else in pairs:
-        lag, correlation = _lag(x, y, reach)
-        if abs(lag) > MAX_LAG * rate:
-            side = "after" if lag > 0 else "before"
-            raise RecordError(
-                f"{where}: {late} come {abs(lag) / rate:.3g} s {side} {early}: channels are not synchronised{or_else}"
-            )
-        if correlation < 0.5:
-            raise RecordError(
-                f"{where}: {late} do not follow {early} (correlation {correlation:.2f}): a record of another plant, "
-                "a wrong sign, or channels that do not belong together"
-            )
-
-
-def _lag(x: Array, y: Array, reach: int) -> tuple[int, float]:
-    """Samples by which `x` is later than `y` where they agree best, and their correlation there."""
-    best = (0, -1.0)
-    for lag in range(-reach, reach + 1, 5):
-        a, b = (x[lag:], y[: len(y) - lag]) if lag >= 0 else (x[:lag], y[-lag:])
-        a, b = a - a.mean(), b - b.mean()
-        scale = float(np.sqrt((a @ a) * (b @ b)))
-        r = float(a @ b) / scale if scale > 0.0 else 0.0
-        if r > best[1] + 1e-6:
-            best = (lag, r)
-    return best

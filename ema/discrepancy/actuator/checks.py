@@ -1,0 +1,130 @@
+"""Cycles that cannot be examined are refused, each in one line that says what is wrong and what would be right."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import nnls
+
+from ema.core.errors import RecordError
+from ema.core.names import CURRENTS
+from ema.core.records import Cycle
+from ema.models.actuator import Actuator
+
+from .features import Array, Signals, motor_torque
+
+MAX_LAG = 6e-3  # [s] no sensor or loop of this plant is that late; channels are apart
+MAX_CLIPPED = 0.1  # share of samples at the largest value
+FOLLOWING = 0.5  # correlation of channels that belong together, at least
+
+
+def check_rate(where: str, cycle: Cycle, plant: Actuator) -> None:
+    """A cycle must be sampled as the plant's recorder does, without gaps."""
+    rate = 1.0 / cycle.period
+    if abs(rate / plant.control.rate - 1.0) > 0.03:
+        raise RecordError(f"{where}: is sampled at {rate:.4g} Hz, the plant's recorder at {plant.control.rate:.4g} Hz")
+    longest = float(np.diff(cycle["t"]).max())
+    if longest > 1.5 * cycle.period:
+        raise RecordError(f"{where}: has a gap of {longest:.3g} s (samples are {cycle.period:.3g} s apart)")
+
+
+def check_signals(where: str, s: Signals, plant: Actuator) -> None:
+    """A cycle must move, not be clipped, and its channels must belong to this plant and to each other."""
+    _check_motion(where, s, plant)
+    _check_clipping(where, s, plant)
+    _check_synchrony(where, s, plant)
+
+
+def _check_motion(where: str, s: Signals, plant: Actuator) -> None:
+    for name, x in (("theta_cmd", s.theta_cmd), ("theta_m", s.theta_m), ("theta_u", s.theta_u)):
+        if np.ptp(x) == 0.0:
+            raise RecordError(f"{where}: {name} is constant; a cycle in motion is needed")
+    for j, name in enumerate(CURRENTS):
+        if np.ptp(s.i[0, j]) <= 6.0 * plant.sensors.current_noise:
+            raise RecordError(f"{where}: {name} is constant; a cycle under current is needed")
+    x, y = s.theta_m[0] / plant.transmission.GR, s.theta_u[0]
+    x, y = x - x.mean(), y - y.mean()
+    slope = float(x @ y) / float(x @ x)
+    if not 1.0 / 3.0 < slope < 3.0:  # a compliant gear may resonate, a wrong ratio is further off
+        raise RecordError(
+            f"{where}: θ_u moves {slope:.3g} times θ_m/GR with the plant's GR = {plant.transmission.GR:g}: "
+            "a record of another plant, or a wrong unit or sign"
+        )
+
+
+def _check_clipping(where: str, s: Signals, plant: Actuator) -> None:
+    step = plant.sensors.adc_step
+    for j, name in enumerate(CURRENTS):
+        x = np.abs(s.i[0, j])
+        top = float(x.max())
+        share = float(np.mean(x >= top - 0.5 * step))
+        if top >= plant.sensors.adc_range - 1.5 * step or (share > MAX_CLIPPED and top > 0.5):
+            raise RecordError(
+                f"{where}: {name} is clipped at {top:.3g} A in {share:.1%} of its samples (ADC range "
+                f"±{plant.sensors.adc_range:g} A); a record with less current or a wider range is needed"
+            )
+
+
+def _check_synchrony(where: str, s: Signals, plant: Actuator) -> None:
+    """Channels that belong together must not be apart by more than any sensor or loop can be late."""
+    rate = plant.control.rate
+    reach = int(0.05 * rate)
+    tau = motor_torque(plant, s)[0][0]
+    w_m = np.gradient(s.theta_m[0], 1.0 / rate)
+    error = s.theta_cmd[0] - s.theta_u[0]
+    c, I_max = plant.control, plant.inverter.I_max
+    I_ref = np.clip(c.K_w * (c.K_p * error - w_m), -I_max, I_max)
+    slow = ", or the current control is far slower than the plant file's"
+    pairs = (
+        ("the currents", "position and command", _lag_of_loop(tau, I_ref, (error, -w_m), reach, rate), slow),
+        ("θ_u", "θ_m", _lag(s.theta_u[0], s.theta_m[0], reach), ""),
+    )
+    for late, early, (lag, correlation), or_else in pairs:
+        if abs(lag) > MAX_LAG * rate:
+            side = "after" if lag > 0 else "before"
+            raise RecordError(
+                f"{where}: {late} come {abs(lag) / rate:.3g} s {side} {early}: channels are not synchronised{or_else}"
+            )
+        if correlation < FOLLOWING:
+            raise RecordError(
+                f"{where}: {late} do not follow {early} (correlation {correlation:.2f}): a record of another plant, "
+                "a wrong sign, or channels that do not belong together"
+            )
+
+
+def _lag_of_loop(tau: Array, I_ref: Array, terms: tuple[Array, Array], reach: int, rate: float) -> tuple[int, float]:
+    """Samples by which the torque is later than what the controller should ask for, and their correlation there.
+
+    Where these do not agree the controller may have other gains, which turn the phase of I_ref: then it is the sum of
+    its `terms` (position error, less speed) with whatever positive gains fit best.
+    """
+    lag, correlation = _lag(tau, I_ref, reach)
+    if abs(lag) <= MAX_LAG * rate and correlation >= FOLLOWING:
+        return lag, correlation
+    x = np.stack([term / np.std(term) for term in terms], axis=1)
+    best = (lag, correlation)
+    for shift in range(-reach, reach + 1, 5):
+        late, early = _shifted(tau, x, shift)
+        late, early = late - late.mean(), early - early.mean(axis=0)
+        gains, left = nnls(early.T @ early, early.T @ late)[0], float(late @ late)
+        r = float(np.sqrt(max(1.0 - float(((late - early @ gains) ** 2).sum()) / left, 0.0))) if left > 0.0 else 0.0
+        if r > best[1] + 1e-6:
+            best = (shift, r)
+    return best
+
+
+def _lag(x: Array, y: Array, reach: int) -> tuple[int, float]:
+    """Samples by which `x` is later than `y` where they agree best, and their correlation there."""
+    best = (0, -1.0)
+    for lag in range(-reach, reach + 1, 5):
+        a, b = _shifted(x, y, lag)
+        a, b = a - a.mean(), b - b.mean()
+        scale = float(np.sqrt((a @ a) * (b @ b)))
+        r = float(a @ b) / scale if scale > 0.0 else 0.0
+        if r > best[1] + 1e-6:
+            best = (lag, r)
+    return best
+
+
+def _shifted(x: Array, y: Array, lag: int) -> tuple[Array, Array]:
+    """What of `x` is so many samples later than `y`, and the `y` beside it; time is the first axis."""
+    return (x[lag:], y[: len(y) - lag]) if lag >= 0 else (x[:lag], y[-lag:])
