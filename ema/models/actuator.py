@@ -39,13 +39,13 @@ class Transmission(Settings):
     F_s: float = quantity("N m", "static friction at the motor shaft", ge=0, le=10)
     F_d: float = quantity("N m", "sliding friction at the motor shaft", ge=0, le=10)
     b: float = quantity("rad", "half-width of the backlash at the user", ge=0, le=0.1)
-    mobility: float = quantity(
-        "rad/(s N m)",
-        "speed at which a load at the user moves it within the backlash; 0: friction holds it there",
-        0.0,
+    F_u: float | None = quantity(
+        "N m",
+        "friction at the user: a load beyond it moves the user within the backlash; none: it holds against any load",
+        None,
         ge=0,
-        le=10,
-        exclude_if=lambda mobility: mobility == 0.0,  # plants keep their hash
+        le=1e5,
+        exclude_if=lambda F_u: F_u is None,  # such plants keep their hash
     )
     theta_stop: float = quantity("rad", "end of travel of the user", gt=0, le=10)
 

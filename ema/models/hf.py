@@ -24,6 +24,7 @@ from .layout import ENERGIES, N_ROWS, N_STATE, STATE, row
 N_LANES = 16
 DT = 1e-6  # [s]
 NO_FILTER = 1e-6  # of the time constants: far below a step
+HELD = 1e9  # [N m] friction at the user that no load overcomes
 N_RING = 64  # control ticks remembered for delays at least
 
 Effects = Mapping[str, Mapping[str, float | np.ndarray]]
@@ -71,11 +72,12 @@ def parameters(plant: Actuator, k: np.ndarray, effects: Effects, dT: float | np.
         N_j = faults.turns(k[:, 2 + j])
         z[row(f"R_{phase}")], z[row(f"L_{phase}")], z[row(f"k_{phase}")] = m.R * N_j, m.L * N_j**2, m.k_e * N_j
     z[row("F_s")], z[row("F_d")] = faults.friction(g.F_s, k[:, 0]), faults.friction(g.F_d, k[:, 0])
+    z[row("F_u")] = HELD if g.F_u is None else g.F_u
     z[row("b")], z[row("zeta")], z[row("dT")] = faults.backlash(g.b, k[:, 1]), k[:, 5], dT
     for section, names in (
         (m, ("p", "theta_0", "phi", "J_m", "C")),
         (inv, ("V_dc", "h", "I_max")),
-        (g, ("GR", "mobility", "theta_stop")),
+        (g, ("GR", "theta_stop")),
         (c, ("K_p", "K_w")),
         (s, ("lvdt_step", "f_lag")),
     ):

@@ -11,7 +11,7 @@ from __future__ import annotations
 from numba import njit
 
 from ema.core.names import CURRENTS, PHASES
-from ema.effects.backlash import deflection, follow
+from ema.effects.backlash import creep, deflection, follow
 from ema.effects.dry_friction import speed_after
 from ema.effects.inverter import comparator, leg_voltage, share_of_step
 from ema.effects.supply_sag import link_voltage
@@ -30,8 +30,8 @@ THETA_M, W_M, THETA_U, W_U, U_DC, ANGLE_ERROR, I_REF = map(
 )
 THETA_0 = row("theta_0")
 R_A, R_B, R_C, L_A, L_B, L_C, K_A, K_B, K_C = (row(f"{x}_{j}") for x in "RLk" for j in PHASES)
-P, ZETA, PHI, V_DC, H, I_MAX, J_M, C, F_S, F_D, GR, B, MOBILITY, THETA_STOP = map(
-    row, ("p", "zeta", "phi", "V_dc", "h", "I_max", "J_m", "C", "F_s", "F_d", "GR", "b", "mobility", "theta_stop")
+P, ZETA, PHI, V_DC, H, I_MAX, J_M, C, F_S, F_D, GR, B, F_U, THETA_STOP = map(
+    row, ("p", "zeta", "phi", "V_dc", "h", "I_max", "J_m", "C", "F_s", "F_d", "GR", "b", "F_u", "theta_stop")
 )
 K_P, K_W, LVDT_STEP, F_LAG, DT = map(row, ("K_p", "K_w", "lvdt_step", "f_lag", "dT"))
 E_ELECTRIC, E_COPPER, E_SHAFT, E_FRICTION, E_USER = map(
@@ -184,7 +184,7 @@ def mechanical_step(z, l, N, dt, tau_m, parts, audited):
     w_next = 0.0 if abs(theta_next) > limit else w_next
     theta_next = min(max(theta_next, -limit), limit)
 
-    crept = theta_u - dt * z[MOBILITY * N + l] * tau_user  # of a user that friction does not hold within the gap
+    crept = theta_u - dt * creep(tau_user, z[F_U * N + l])
     if len(parts) & GEAR:
         w_u_next = w_u + dt / J_u * (tau_gear - tau_user)
         theta_soft = min(max(theta_u + w_u_next * dt, -stop), stop)

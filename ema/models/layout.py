@@ -27,7 +27,7 @@ PARAMETERS = (
         "F_d",
         "GR",
         "b",
-        "mobility",
+        "F_u",
         "theta_stop",
         "K_p",
         "K_w",

@@ -18,7 +18,7 @@ from .growing import beside, growing, said, widened
 from .noise import Noise, Verdict
 from .paths import faults_only, gone_on, resume, shortest, with_faults
 from .plant import EmaPlant
-from .play import as_held, with_mobility
+from .play import as_held, with_friction
 from .select import Model, Search
 from .simpler import (
     simpler,
@@ -133,5 +133,5 @@ def examine(
     if path.step:
         conditions.append(f"the comparators of the record switch as if evaluated every {1e6 * path.step:g} µs")
     findings.notes.extend(conditions)
-    findings = with_mobility(stated, plant, findings)
+    findings = with_friction(stated, plant, findings)
     return Examination(findings, search, before, after, path.verdict_before, v)

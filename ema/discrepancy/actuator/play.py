@@ -1,13 +1,14 @@
 """Whether friction at the user holds it within the play, or its load presses it to one side: read from the record.
 
 With θ_m/GR as recorded, the gap θ_m/GR - θ_u is that of a play operator if the user stays where it was pushed. If a
-load moves it, the gap is ±b by the sign of the load, whichever way the rotor turns: all along for a constant load, from
-one side of a position to the other for a spring.
+load moves it, the gap is ±b by the sign of the load, whichever way the rotor turns: all along for a constant load, for
+a spring on either side of where it is at rest, from where friction at the user holds it no longer.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -18,13 +19,23 @@ from ema.effects.backlash import follow
 from ema.models.actuator import Actuator
 
 from .cycles import Measured
-from .features import GROUPS, Array, local_mean, spacing
+from .features import GROUPS, Array, acceleration, local_mean, motor_torque, spacing
 
-FREE = 1.0  # [rad/(s N m)] crosses the play within a millisecond under loads that matter, and is stable in every step
 LOADS = {"constant_load", "spring_load", "position_torque"}
 CLEAR = 0.3  # share of the gap's squared rest below which the user is taken as moved by its load
-PLAYS = np.geomspace(1e-3, 1.0, 20)  # k2 that are tried, beside none
+PLAYS = np.concatenate([[0.0], np.geomspace(1e-3, 1.0, 20)])  # k2 that are tried
 QUANTILES = np.linspace(0.02, 0.98, 25)  # of the positions, at which a load may change its sign
+HOLDS = np.array([0.0, 0.04, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3, 0.4, 0.5])  # of the travel, to either side of there
+SPEED = 2.0  # [rad/s] over which friction changes its sign
+
+
+class Pressed(NamedTuple):
+    """Where a load presses the user to one side of the play: outside `centre` ± `holds`. [rad]"""
+
+    b: float
+    side: float
+    centre: float
+    holds: float
 
 
 def as_held(plant: Actuator, data: Measured) -> tuple[Actuator, Measured]:
@@ -32,52 +43,82 @@ def as_held(plant: Actuator, data: Measured) -> tuple[Actuator, Measured]:
 
     The middle of the play is not seen then, so zeros of sensors that lie apart are not told from it.
     """
-    if plant.transmission.mobility or not is_pressed(plant, data):
+    found = pressed(plant, data) if plant.transmission.F_u is None else None
+    if found is None:
         return plant, data
-    transmission = plant.transmission.model_copy(update={"mobility": FREE})
+    F_u = float(f"{abs(_stiffness(plant, data)) * found.holds:.3g}") if found.holds else 0.0
+    transmission = plant.transmission.model_copy(update={"F_u": F_u})
     return plant.model_copy(update={"transmission": transmission}), replace(data, zero=0.0)
 
 
-def with_mobility(stated: Actuator, taken: Actuator, findings: Findings) -> Findings:
-    """The findings, with the user that the load they name moves within the play, for extended.yaml."""
-    if taken.transmission == stated.transmission or not LOADS & {e.name for e in findings.effects}:
+def with_friction(stated: Actuator, taken: Actuator, findings: Findings) -> Findings:
+    """The findings, with the friction at the user that the load they name overcomes, for extended.yaml."""
+    F_u = taken.transmission.F_u
+    if F_u == stated.transmission.F_u or not LOADS & {e.name for e in findings.effects}:
         return findings
-    section = taken.transmission.model_dump()
-    findings.notes.append("the load presses the user to one side of the play, nothing holds it there (mobility)")
-    return replace(findings, fitted={**findings.fitted, "transmission": section})
+    findings.notes.append(
+        "the load presses the user to one side of the play, "
+        + (f"against friction at the user of about {F_u:.2g} N m" if F_u else "nothing at the user holds it there")
+    )
+    return replace(findings, fitted={**findings.fitted, "transmission": taken.transmission.model_dump()})
 
 
-def is_pressed(plant: Actuator, data: Measured) -> bool:
-    """Whether a gap by the sign of a load leaves clearly less of the recorded one than the play operator does."""
+def pressed(plant: Actuator, data: Measured) -> Pressed | None:
+    """How a load presses the user to one side; None where the play operator leaves no more of the recorded gap."""
     g = plant.transmission
     m = spacing(GROUPS["gap"][0], plant.control.rate, len(data.signals[0].theta_u[0]))
     shafts = [np.ascontiguousarray(s.theta_m[0] / g.GR) for s in data.signals]
+    starts = (data.start[:, 0] + data.zero).tolist()
     gaps = [_level(local_mean(shaft - s.theta_u[0], m)) for shaft, s in zip(shafts, data.signals, strict=True)]
 
-    def left(predicted: list[Array]) -> float:
-        return sum(float(((gap - _level(x)) ** 2).sum()) for gap, x in zip(gaps, predicted, strict=True))
+    def left(by: Pressed) -> float:
+        users = [_user(shaft, start, *by) for shaft, start in zip(shafts, starts, strict=True)]
+        predicted = [_level(local_mean(shaft - user, m)) for shaft, user in zip(shafts, users, strict=True)]
+        return sum(float(((gap - x) ** 2).sum()) for gap, x in zip(gaps, predicted, strict=True))
 
-    held, pressed = [], []
-    everywhere, starts = np.concatenate(shafts), data.start[:, 0] + data.zero
-    for b in faults.backlash(g.b, np.concatenate([[0.0], PLAYS])):
-        users = [_held(shaft, theta_u, float(b)) for shaft, theta_u in zip(shafts, starts.tolist(), strict=True)]
-        held.append(left([local_mean(shaft - user, m) for shaft, user in zip(shafts, users, strict=True)]))
-        for centre in (-np.inf, *np.quantile(everywhere, QUANTILES)):
-            side = [local_mean(b * np.sign(shaft - centre), m) for shaft in shafts]
-            pressed += [left(side), left([-x for x in side])]
-    return min(pressed) < CLEAR * min(held)
+    plays = faults.backlash(g.b, PLAYS).tolist()
+    centres = np.quantile(np.concatenate(shafts), QUANTILES).tolist()
+    held = min(left(Pressed(b, 1.0, 0.0, np.inf)) for b in plays)
+    tried = [Pressed(b, side, centre, 0.0) for b in plays for side in (1.0, -1.0) for centre in (-np.inf, *centres)]
+    best = min(tried, key=left)
+    if np.isfinite(best.centre):
+        travel = float(np.ptp(np.concatenate(shafts)))
+        tried = [best._replace(centre=c, holds=float(x)) for c in (best.centre, *centres) for x in HOLDS * travel]
+        best = min(tried, key=left)
+    return best if left(best) < CLEAR * held else None
 
 
 def _level(gap: Array) -> Array:
-    return gap - gap.mean()
+    return np.asarray(gap - gap.mean())
 
 
 @njit(nogil=True)
-def _held(shaft: Array, start: float, b: float) -> Array:
+def _user(shaft: Array, start: float, b: float, side: float, centre: float, holds: float) -> Array:
     """θ_u behind a play, from where it starts. [rad]"""
     user = np.empty(len(shaft))
     theta_u = start
     for t in range(len(shaft)):
         theta_u = follow(theta_u, shaft[t], b)
+        if shaft[t] - centre > holds:
+            theta_u = shaft[t] - side * b
+        elif shaft[t] - centre < -holds:
+            theta_u = shaft[t] + side * b
         user[t] = theta_u
     return user
+
+
+def _stiffness(plant: Actuator, data: Measured) -> float:
+    """Torque at the user per position, from the motor's torque balance beside friction, drag and a constant.
+
+    [N m/rad]
+    """
+    T, GR = 1.0 / plant.control.rate, plant.transmission.GR
+    A, y = [], []
+    for s in data.signals:
+        m = spacing(GROUPS["torque"][0], plant.control.rate, s.theta_m.shape[1])
+        w_m = np.gradient(s.theta_m[0], T)
+        terms = (s.theta_u[0], np.tanh(w_m / SPEED), w_m, np.ones_like(w_m))
+        A.append(np.stack([local_mean(x, m) for x in terms], axis=1))
+        tau = local_mean(motor_torque(plant, s)[0][0], m)
+        y.append(tau - plant.motor.J_m * acceleration(s.theta_m[0], m, T))
+    return GR * float(np.linalg.lstsq(np.concatenate(A), np.concatenate(y), rcond=None)[0][0])
