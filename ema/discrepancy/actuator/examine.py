@@ -102,8 +102,8 @@ def examine(
     before, alike = path.before, path.alike
     after, v = settled, _ = at_the_minimum(search, path.after, path.verdict)
     if not path.verdict_before.is_noise:
-        after, v = with_fewer_faults(search, after, v, alike)
-        after, v = simpler(search, after, v, alike, path.as_well)
+        after, v = with_fewer_faults(search, before, after, v, alike)
+        after, v = simpler(search, before, after, v, alike, path.as_well)
     after, v = without_superfluous(search, after, v, alike)
     if after is not settled:
         after, v = at_the_minimum(search, after, v)

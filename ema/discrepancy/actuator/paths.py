@@ -136,6 +136,6 @@ def _gone(search: Search, begun: Path) -> Path:
                 before, verdict_before = other, w
             after, v = grown(search, before, other, w, alike)
     if verdict_before.is_noise:
-        after, v = simpler(search, after, v, alike, as_well)
+        after, v = simpler(search, before, after, v, alike, as_well)
     plant = search.plant
     return Path(search.noise, plant.step, plant.late, search.tried, before, verdict_before, after, v, alike, as_well)

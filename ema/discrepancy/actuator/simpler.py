@@ -12,12 +12,19 @@ from .forward import SAME
 from .noise import Noise, Verdict
 from .select import CHANCE, Model, Search
 from .verdicts import NEARLY
-from .weighing import ALIKE, DOUBTFUL, is_alike, is_credible, may_be_nothing
+from .weighing import ALIKE, DOUBTFUL, is_alike, is_credible, is_enough, may_be_nothing
 
 
-def with_fewer_faults(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+def _leaves_little(model: Model, v: Verdict, before: Model) -> bool:
+    """Whether `model` may be right but for its noise or the form of its laws."""
+    return v.is_noise or model.excess <= NEARLY or (bool(model.effects) and is_enough(model, before))
+
+
+def with_fewer_faults(
+    search: Search, before: Model, model: Model, v: Verdict, alike: list[tuple[str, ...]]
+) -> tuple[Model, Verdict]:
     """`model`, or where it leaves little, one without faults whose common part an effect of it can be just as well."""
-    if not v.is_noise and model.excess > NEARLY:
+    if not _leaves_little(model, v, before):
         return model, v
     for place, effect in enumerate(model.effects):
         m = search.without_common_faults(model, effect)
@@ -49,14 +56,14 @@ def _instead(model: Model) -> str:
 
 
 def simpler(
-    search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]], as_well: list[str]
+    search: Search, before: Model, model: Model, v: Verdict, alike: list[tuple[str, ...]], as_well: list[str]
 ) -> tuple[Model, Verdict]:
     """`model`, or where it leaves little, one with an effect for several faults that leaves no more.
 
     With no fewer parameters than `model` it must leave less; what leaves as much is told in `as_well`.
     What runs differ by depends on the model too, so either is weighed by the noise of both.
     """
-    if not v.is_noise and model.excess > NEARLY:
+    if not _leaves_little(model, v, before):
         return model, v
     as_good = []
     here = search.noise
