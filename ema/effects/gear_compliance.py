@@ -7,13 +7,15 @@ from .base import NOT_NEGATIVE, POSITIVE, Effect, Parameter
 EFFECT = Effect(
     name="gear_compliance",
     parameters=(
-        Parameter("compliance", "rad/(N m)", 0.0, 0.0, 0.0003, 3e-05, "twist of the gear train per torque at the user"),
-        Parameter("inertia", "kg m^2", 0.5, 0.05, 3.0, 0.5, "inertia at the user"),
+        Parameter("compliance", "rad/(N m)", 0.0, 0.0, 0.01, 3e-05, "twist of the gear train per torque at the user"),
+        Parameter("inertia", "kg m^2", 0.5, 0.001, 10.0, 0.5, "inertia at the user"),
         Parameter("damping", "1", 0.05, 0.005, 0.5, 0.05, "damping ratio of the resonance"),
+        Parameter("drag", "N m s/rad", 0.0, 0.0, 1000.0, 5.0, "viscous drag at the user"),
+        Parameter("friction", "N m", 0.0, 0.0, 100.0, 1.0, "dry friction at the user"),
     ),
     sentence="the gear train gives {compliance:.2g} rad per N m; with {inertia:.2g} kg m² at the user it resonates",
     separated_by="fast motion with both θ_m and θ_u measured",
     mistaken_for=("k2",),
     plants=("ema", "axis"),
-    limits={"compliance": NOT_NEGATIVE, "inertia": POSITIVE, "damping": NOT_NEGATIVE},
+    limits={"inertia": POSITIVE, **dict.fromkeys(("compliance", "damping", "drag", "friction"), NOT_NEGATIVE)},
 )

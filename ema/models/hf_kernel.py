@@ -38,6 +38,7 @@ E_ELECTRIC, E_COPPER, E_SHAFT, E_FRICTION, E_USER = map(
     row, ("E_electric", "E_copper", "E_shaft", "E_friction", "E_user")
 )
 COMPLIANCE, INERTIA, DAMPING = (row(f"gear_compliance.{x}") for x in ("compliance", "inertia", "damping"))
+USER_DRAG, USER_FRICTION = row("gear_compliance.drag"), row("gear_compliance.friction")
 SOURCE_R, SOURCE_C = row("supply_sag.resistance"), row("supply_sag.capacitance")
 DEAD_TIME, DELAY = row("dead_time.time"), row("comparator_delay.time")
 COMMUTATION, APART = map(row, ("commutation_offset.angle", "commutation_offset.apart"))
@@ -186,7 +187,8 @@ def mechanical_step(z, l, N, dt, tau_m, parts, audited):
 
     crept = theta_u - dt * creep(tau_user, z[F_U * N + l])
     if len(parts) & GEAR:
-        w_u_next = w_u + dt / J_u * (tau_gear - tau_user)
+        F_u, tau_u = z[USER_FRICTION * N + l], tau_gear - tau_user - z[USER_DRAG * N + l] * w_u
+        w_u_next = speed_after(w_u, tau_u, F_u, F_u, dt / J_u) if F_u > 0.0 else w_u + dt / J_u * tau_u
         theta_soft = min(max(theta_u + w_u_next * dt, -stop), stop)
         w_u_next = w_u_next if abs(theta_soft) < stop else 0.0
         z[W_U * N + l] = w_u_next if soft else w_next / gr

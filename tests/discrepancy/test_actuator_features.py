@@ -7,6 +7,7 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator import features as f
+from ema.discrepancy.actuator.controller import gains
 from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.fit import residuals
 from ema.discrepancy.actuator.gear import resonance
@@ -66,6 +67,10 @@ def nothing_is_noise(plant, record: Record) -> bool:
     return verdict(noise, [left[c] for c in cycles], cycles, nothing_free, 1.0 / 16).is_noise
 
 
+def prepared(plant, cycles):
+    return measured(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
+
+
 def test_a_record_cut_out_of_a_longer_motion_starts_in_motion(hidden, shipped_plant):
     whole = hidden.cycle(hidden.Flaws(), hidden.sine(6e-3, 5.0, 0.36), hidden.rest(), 3)
     cut = Cycle(0, {name: x[500:3500] for name, x in whole.items()})
@@ -92,8 +97,45 @@ def test_a_resonating_gear_is_seen_in_rotor_and_user(hidden, shipped_plant, k2):
     assert found.inertia == pytest.approx(0.6, rel=0.02)
     assert found.damping == pytest.approx(15.0 * (1.5e-5 / 0.6) ** 0.5, rel=0.15)
     assert found.k2 == pytest.approx(k2, abs=0.003)
+    assert (found.drag, found.friction) == (0.0, 0.0)
 
 
-def test_a_stiff_gear_has_no_resonance(hidden, shipped_plant):
-    stiff = hidden.cycle(hidden.Flaws(), hidden.chirp(), hidden.rest(), 1)
-    assert resonance(shipped_plant, measured(shipped_plant, [Record((Cycle(0, stiff),))])) is None
+def test_drag_and_friction_at_the_user_do_not_hide_its_resonance(hidden, shipped_plant):
+    """What the user loses to the fixed world is no damping of the gear: asked for that alone, nothing was found."""
+    flaws = hidden.Flaws(compliance=2.5e-5, user_inertia=0.15, user_damping=8.0, user_drag=10.0, user_rubbing=1.0)
+    found = resonance(shipped_plant, prepared(shipped_plant, hidden.cycles(flaws, 3, 1, motions=(hidden.chirp(),))))
+    assert found is not None
+    assert found.compliance * found.inertia == pytest.approx(2.5e-5 * 0.15, rel=0.03)
+    assert found.drag / found.inertia == pytest.approx(10.0 / 0.15, rel=0.1)
+    assert found.friction / found.inertia == pytest.approx(1.0 / 0.15, rel=0.1)
+    assert found.k2 == pytest.approx(0.0, abs=0.003)
+
+
+@pytest.mark.parametrize("flaws", [{}, {"k2": 0.1}, {"load": 3.0}, {"spring": 1500.0, "holding": 0.5}])
+def test_a_stiff_gear_has_no_resonance(hidden, shipped_plant, flaws):
+    stiff = hidden.cycle(hidden.Flaws(**flaws), hidden.chirp(), hidden.rest(), 1)
+    assert resonance(shipped_plant, prepared(shipped_plant, [stiff])) is None
+
+
+def test_the_control_balance_of_a_sound_actuator_is_small(hidden, shipped_plant):
+    """Σ over phases by the sector the rotor is in, less what the controller asks for: ripple and the limit are left."""
+    data = prepared(shipped_plant, hidden.cycles(hidden.Flaws(), 2, 4))
+    for s in data.signals:
+        found = f.features(shipped_plant, s)
+        assert np.sqrt(np.mean(found["control"] ** 2)) < 0.1
+        assert np.abs(found["current"]).max() > 0.5
+
+
+@pytest.mark.parametrize("change", [-0.3, -0.1, 0.2])
+def test_other_gains_of_the_controller_are_read_from_the_record(hidden, shipped_plant, change):
+    data = prepared(shipped_plant, hidden.cycles(hidden.Flaws(speed_gain=change), 2, 4))
+    assert gains(shipped_plant, data.signals) == pytest.approx((1.0, 1.0 + change), abs=0.03)
+    control = shipped_plant.control.model_copy(update={"K_p": shipped_plant.control.K_p / (1.0 + change)})
+    other = shipped_plant.model_copy(update={"control": control})
+    data = prepared(other, hidden.cycles(hidden.Flaws(), 2, 4))
+    assert gains(other, data.signals) == pytest.approx((1.0 + change, 1.0), abs=0.03)
+
+
+@pytest.mark.parametrize("flaws", [{}, {"viscous": 1e-4}, {"k3": 0.3}, {"position_delay": 1e-3}, {"reaction": 3e-6}])
+def test_what_is_no_controller_is_not_taken_for_other_gains(hidden, shipped_plant, flaws):
+    assert gains(shipped_plant, prepared(shipped_plant, hidden.cycles(hidden.Flaws(**flaws), 2, 4)).signals) is None

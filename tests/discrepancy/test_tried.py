@@ -39,7 +39,7 @@ def test_the_actuator(monkeypatch):
     plant = config.load(resources.config("actuator.yaml"), Actuator)
     signals = SimpleNamespace(u_dc=np.full(100, 28.0), i=np.full((1, 3, 100), 5.0))
     data = SimpleNamespace(zero=0.0, dT=np.array([0.0, 30.0]), signals=[signals, signals])
-    resonance = Resonance(compliance=1e-3, inertia=1e-3, damping=0.1, k2=0.0, starts=np.zeros((2, 2)))
+    resonance = Resonance(1e-3, 1e-3, damping=0.1, drag=1.0, friction=0.1, k2=0.0, starts=np.zeros((2, 2)))
     monkeypatch.setattr(actuator, "resonance", lambda plant, data: resonance)
     monkeypatch.setattr(actuator, "lines", lambda torques: [(18.0, 0.5)])
     monkeypatch.setattr(actuator, "bumps", lambda torques: [(0.01, 1e-3)])

@@ -58,6 +58,8 @@ class Flaws(NamedTuple):
     compliance: float = 0.0  # [rad/(N m)] with the user's own inertia and a viscous damper
     user_inertia: float = 0.6
     user_damping: float = 0.0  # [N m s/rad]
+    user_drag: float = 0.0  # [N m s/rad] against the fixed world
+    user_rubbing: float = 0.0  # [N m] dry, smooth within 1 mrad/s
     # sensors
     gain_a: float = 0.0
     gain_b: float = 0.0
@@ -300,7 +302,8 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
                 theta, faster = math.copysign(end, theta), 0.0
             mech[0], mech[1] = theta, faster
             if f.compliance > 0.0:
-                w_u += dt / f.user_inertia * (gear_torque - f.load - f.spring * theta_u)
+                rubbing = f.user_drag * w_u + f.user_rubbing * math.tanh(w_u / 1e-3)
+                w_u += dt / f.user_inertia * (gear_torque - f.load - f.spring * theta_u - rubbing)
                 theta_u += dt * w_u
             else:
                 theta_u = min(max(theta_u, theta / GR - b), theta / GR + b)

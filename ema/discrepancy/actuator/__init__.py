@@ -2,11 +2,11 @@
 
 `cycles` checks and groups the records; `features` reduces a cycle to balances that feel physics; `plant` simulates
 the cycles at any point of faults and effects; `noise` says what two runs differ by, and whether a residual is more;
-`fit` is Gauss–Newton on simulated means; `weak` and `candidates` say what to try, `select` tries it, `structure`
-and `repeating` describe what is left, `examine` is the whole run, `pictures` shows it. Of the run, `paths` are its
-ways, `forward` adds effects, `weighing` says whether one is real, `verdicts` makes sure, `simpler` prefers fewer
-causes, `telling` puts the model into findings. Before it `checks` refuses, `conditions`, `comparators`, `timing`,
-`sampling`, `play` and `zeros` read what is no flaw of the actuator, `growing` whether its faults change.
+`fit` is Gauss–Newton on simulated means; `weak` and `candidates` say what to try, `select` tries it, `structure`,
+`controller` and `repeating` describe what is left, `examine` is the whole run, `pictures` shows it. Of the run, `paths`
+are its ways, `forward` adds effects, `weighing` says whether one is real, `verdicts` makes sure, `simpler` prefers
+fewer causes, `telling` puts the model into findings. Before it `checks` refuses, `conditions`, `comparators`,
+`timing`, `sampling`, `play` and `zeros` read what is no flaw of the actuator, `growing` whether its faults change.
 """
 
 from __future__ import annotations

@@ -259,7 +259,8 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line:
     gear = resonance(plant, data)
     if gear is not None:
         step = {"compliance": gear.compliance}
-        c = _plain("gear_compliance", "compliance", step=step, inertia=gear.inertia, damping=gear.damping)
+        held_back = {name: x for name, x in (("drag", gear.drag), ("friction", gear.friction)) if x}
+        c = _plain("gear_compliance", "compliance", step=step, inertia=gear.inertia, damping=gear.damping, **held_back)
         found.append(Seen(**vars(c), faults_seen={"k2": gear.k2}))
     for order, _ in lines(torques):
         frees = (

@@ -26,7 +26,7 @@ import numpy as np
 from numba import njit, vectorize
 from numpy.typing import NDArray
 
-from ema.effects.trapezoid import six_step, trap
+from ema.effects.trapezoid import sector, six_step, trap
 from ema.models.actuator import Actuator
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ GROUPS = {
 }
 
 _trap = vectorize(nopython=True)(lambda x: trap(x))
-_six_step = vectorize(nopython=True)(lambda x: six_step(x))
+_six_step = vectorize(nopython=True)(lambda x: six_step(sector(x)))
 PHASE = np.array([0.0, 2.0, 4.0])[:, None] * np.pi / 3.0
 
 
@@ -150,6 +150,11 @@ def motor_torque(plant: Actuator, signals: Signals) -> tuple[Array, Array]:
     return (plant.motor.k_e * _trap(theta_e) * signals.i).sum(axis=1), theta_e
 
 
+def dc_current(theta_e: Array, i: Array) -> Array:
+    """DC-equivalent current with its sign, from electrical angles and currents by phase (n, 3, n_times). [A]"""
+    return np.asarray(0.5 * (_six_step(theta_e) * i).sum(axis=1))
+
+
 def features(plant: Actuator, signals: Signals) -> dict[str, Array]:
     """The groups of the table above, each (n, n_features)."""
     rate = plant.control.rate
@@ -158,15 +163,15 @@ def features(plant: Actuator, signals: Signals) -> dict[str, Array]:
     m = {name: spacing(seconds, rate, n_times) for name, (seconds, _, _) in GROUPS.items()}
     tau, theta_e = motor_torque(plant, signals)
     w_m = np.gradient(signals.theta_m, T, axis=-1)
-    i_q = 0.5 * (_six_step(theta_e) * signals.i).sum(axis=1)
+    i_q = dc_current(theta_e, signals.i)
     c, limit = plant.control, plant.inverter.I_max
     I_ref = np.clip(c.K_w * (c.K_p * (signals.theta_cmd - signals.theta_u) - w_m), -limit, limit)
     lag = current_lag(plant) + 0.5
     smooth = np.apply_along_axis(np.convolve, -1, i_q, np.ones(21) / 21.0, "same")
-    sector = (theta_e / (2.0 * np.pi)) % 1.0 * SECTORS
+    at = (theta_e / (2.0 * np.pi)) % 1.0 * SECTORS
     sign = smooth / (np.abs(smooth) + I_SIGN)
     skip = round(SETTLING * rate)
-    table = _table(signals.i[:, :, skip:], sector[:, :, skip:], sign[:, skip:])
+    table = _table(signals.i[:, :, skip:], at[:, :, skip:], sign[:, skip:])
     gap = local_mean(signals.theta_m / plant.transmission.GR - signals.theta_u, m["gap"])
     found = {
         "torque": local_mean(tau, m["torque"])

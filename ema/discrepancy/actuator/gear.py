@@ -3,9 +3,11 @@
 A resonance is no small change of anything, so no finite difference points at it. But with the measured rotor as input,
 the user behind a spring is a small model of its own,
 
-    J_u dω_u/dt = K δ + 2 ζ √(K J_u) (ω_m/GR - ω_u)  where the gap is closed,   δ = deflection(θ_u, θ_m/GR, b)
+    J_u dω_u/dt = K δ + 2 ζ √(K J_u) (ω_m/GR - ω_u) - C_u ω_u - friction(F_u),   δ = deflection(θ_u, θ_m/GR, b)
 
-in which only K/J_u and ζ matter for θ_u; the torque balance of the motor, which accelerates J_u too, then tells J_u.
+(the damper acts where the gap is closed), in which only K/J_u, ζ, C_u/J_u and F_u/J_u matter for θ_u; the torque
+balance of the motor, which accelerates J_u too, then tells J_u. Drag and friction at the user are left out where they
+make little difference.
 """
 
 from __future__ import annotations
@@ -18,19 +20,24 @@ from numba import njit
 from scipy.optimize import least_squares, minimize
 
 from ema.effects.backlash import deflection
+from ema.effects.dry_friction import speed_after
 from ema.faults import backlash
 from ema.models.actuator import Actuator
 
+from .conditions import roughness
 from .cycles import Measured
 from .features import GROUPS, Array, acceleration, current_lag, delayed, local_mean, motor_torque, spacing
+from .play import PLAYS, held_user
 
 FREQUENCIES = np.geomspace(100.0, 2000.0, 32)  # [rad/s]
 DAMPINGS = (0.01, 0.03, 0.1, 0.3)
 WIDER = (1.0, 4.0)  # times the nominal backlash
+NONE, HELD_BACK = (0.0, 0.0), ((30.0, 1e-3), (30.0, 5.0))  # C_u/J_u [1/s] and F_u/J_u [rad/s²] to begin with
+LOUD = 3.0  # times the noise of θ_u, from where what a user without friction leaves is asked for it
 CLEAR = 0.7  # share of the squared gap's change from which a resonance is worth simulating
-INERTIAS = (0.1, 2.5)  # [kg m²]
+INERTIAS = (2e-3, 9.0)  # [kg m²]
 N_CYCLES = 4
-N_TURNS = 2
+N_TURNS, N_STEPS = 2, 28  # turns of a fit, steps of each per parameter
 FIRST_SWING = 8.0  # [rad] of the resonance
 N_SUBSTEPS = 5  # of a sample, else the resonance comes out a hundredth too low
 MOVING = 10.0  # [rad/s] slower, dry friction takes up what it likes
@@ -39,7 +46,7 @@ REST = 0.1  # [N m] what is left of a cycle's torque balance, root of the sum of
 
 
 class Resonance(NamedTuple):
-    """Start values of the effect `gear_compliance`: rad/(N m), kg m², damping ratio; and what comes with them.
+    """Start values of the effect `gear_compliance`, in its units; and what comes with them.
 
     `k2` is the fault beside it, `starts` are θ_u and ω_u at the start of each cycle, shape (n_cycles, 2). [rad, rad/s]
     """
@@ -47,13 +54,26 @@ class Resonance(NamedTuple):
     compliance: float
     inertia: float
     damping: float
+    drag: float
+    friction: float
     k2: float
     starts: Array
 
 
+class Gear(NamedTuple):
+    """What θ_u tells of a gear that gives: √(K/J_u) [rad/s], ζ, b [rad], C_u/J_u [1/s], F_u/J_u [rad/s²]."""
+
+    w_0: float
+    zeta: float
+    b: float
+    drag: float = 0.0
+    friction: float = 0.0
+
+
 @njit(nogil=True)
-def _user(shaft: Array, start: Array, w_0: float, zeta: float, b: float, T: float) -> Array:
+def _user(shaft: Array, start: Array, gear: Gear, T: float) -> Array:
     """θ_u of a user behind a spring, driven by θ_m/GR; `start`: its θ_u and ω_u. [rad]"""
+    w_0, zeta, b, drag, friction = gear
     theta, w = start[0], start[1]
     out = np.empty(len(shaft))
     out[0] = theta
@@ -62,10 +82,10 @@ def _user(shaft: Array, start: Array, w_0: float, zeta: float, b: float, T: floa
         w_shaft = (shaft[t] - shaft[t - 1]) / T
         for n in range(N_SUBSTEPS):
             twist = deflection(theta, shaft[t - 1] + (n + 0.5) * dt * w_shaft, b)
-            push = w_0 * w_0 * twist
+            push = w_0 * w_0 * twist - drag * w
             if twist != 0.0:
                 push += 2.0 * zeta * w_0 * (w_shaft - w)
-            w += dt * push
+            w = speed_after(w, push, friction, friction, dt) if friction > 0.0 else w + dt * push
             theta += dt * w
         out[t] = theta
     return out
@@ -85,35 +105,81 @@ def resonance(plant: Actuator, data: Measured) -> Resonance | None:
     T = 1.0 / plant.control.rate
     users = [s.theta_u[0] for s in data.signals]
     shafts = [np.ascontiguousarray(s.theta_m[0] / plant.transmission.GR) for s in data.signals]
-    starts = np.stack([data.start[:, 0], data.user_speed], axis=1)
+    n = len(users[:N_CYCLES])
+    stiff = sum(float(np.var(user - shaft)) for shaft, user in zip(shafts[:n], users, strict=False))
+    as_noise = n * (LOUD * max(roughness(user) for user in users)) ** 2
+    found = _gear(plant, shafts, users, data, NONE, CLEAR * stiff)
+    left = stiff if found is None else found[2]
+    starts = data.start[:n, 0].tolist()
+    held = min(_left_by_play(shafts, users, starts, b) for b in backlash(plant.transmission.b, PLAYS).tolist())
+    if min(left, held) > as_noise:
+        tried = (_gear(plant, shafts, users, data, c, CLEAR * min(left, held)) for c in HELD_BACK)
+        found = min((g for g in tried if g is not None), key=lambda g: g[2], default=found)
+    if found is None:
+        return None
+    gear, starts, _ = found
+    inertia = _inertia(plant, data, [_user(s, start, gear, T) for s, start in zip(shafts, starts, strict=True)])
+    k2 = (gear.b / plant.transmission.b - 1.0) / (backlash(1.0, 1.0) - 1.0)
+    return Resonance(
+        1.0 / (gear.w_0**2 * inertia),
+        inertia,
+        float(np.clip(gear.zeta, 0.005, 0.5)),
+        gear.drag * inertia,
+        gear.friction * inertia,
+        float(np.clip(k2, 0.0, 1.0)),
+        starts,
+    )
 
-    def misfit(w_0: float, zeta: float, b: float) -> float:
-        if not 0.5 * FREQUENCIES[0] < w_0 < 2.0 * FREQUENCIES[-1] or zeta > 1.0:
+
+def _left_by_play(shafts: list[Array], users: list[Array], starts: list[float], b: float) -> float:
+    """What a stiff gear with a play leaves of θ_u; `shafts` and `users` of as many cycles as there are `starts`."""
+    cycles = zip(shafts, users, starts, strict=False)
+    return sum(float(np.var(user - held_user(shaft, start, b))) for shaft, user, start in cycles)
+
+
+def _gear(
+    plant: Actuator, shafts: list[Array], users: list[Array], data: Measured, back: tuple[float, float], least: float
+) -> tuple[Gear, Array, float] | None:
+    """A gear and the starts of its user (n_cycles, 2), which leave that much of θ_u, begun with C_u/J_u and F_u/J_u.
+
+    None where more than `least` is left, or what is left needs no resonance. Without drag and friction to begin with,
+    these stay zero.
+    """
+    T = 1.0 / plant.control.rate
+    starts = np.stack([data.start[:, 0], data.user_speed], axis=1)
+    free = slice(0, 3 if back == NONE else 5)
+
+    def gear(x: Array) -> Gear:
+        return Gear(*np.exp(x).tolist())
+
+    def misfit(g: Gear) -> float:
+        if not 0.5 * FREQUENCIES[0] < g.w_0 < 2.0 * FREQUENCIES[-1] or g.zeta > 1.0:
             return np.inf
         cycles = zip(shafts[:N_CYCLES], users, starts, strict=False)
-        return sum(float(np.var(user - _user(shaft, start, w_0, zeta, b, T))) for shaft, user, start in cycles)
+        return sum(float(np.var(user - _user(shaft, start, g, T))) for shaft, user, start in cycles)
 
-    stiff = sum(float(np.var(user - shaft)) for shaft, user in zip(shafts[:N_CYCLES], users, strict=False))
-    grid = [(w, z, plant.transmission.b * x) for w in FREQUENCIES for z in DAMPINGS for x in WIDER]
-    best = min(grid, key=lambda x: misfit(*x))
+    grid = [Gear(w, z, plant.transmission.b * x, *back) for w in FREQUENCIES for z in DAMPINGS for x in WIDER]
+    best = min(grid, key=misfit)
+    left = np.inf
     for _ in range(N_TURNS):  # the gear by the starts, the starts by the gear
-        found = minimize(lambda x: misfit(*np.exp(x)), np.log(best), method="Nelder-Mead", options={"maxiter": 80})
-        if found.fun > CLEAR * stiff:
+        found = minimize(
+            lambda x: misfit(gear(x)),
+            np.log(best[free]),
+            method="Nelder-Mead",
+            options={"maxiter": N_STEPS * free.stop},
+        )
+        if found.fun > least or (back != NONE and np.exp(found.x[0]) > FREQUENCIES[-1]):
             return None
-        best = tuple(np.exp(found.x).tolist())
-        starts = np.array([_started(*of, *best, T) for of in zip(shafts, users, starts, strict=True)])
-    w_0, zeta, b = best
-    inertia = _inertia(plant, data, [_user(s, start, *best, T) for s, start in zip(shafts, starts, strict=True)])
-    k2 = (b / plant.transmission.b - 1.0) / (backlash(1.0, 1.0) - 1.0)
-    damping = float(np.clip(zeta, 0.005, 0.5))
-    return Resonance(1.0 / (w_0**2 * inertia), inertia, damping, float(np.clip(k2, 0.0, 1.0)), starts)
+        best, left = gear(found.x), float(found.fun)
+        starts = np.array([_started(*of, best, T) for of in zip(shafts, users, starts, strict=True)])
+    return best, starts, left
 
 
-def _started(shaft: Array, user: Array, start: Array, w_0: float, zeta: float, b: float, T: float) -> Array:
+def _started(shaft: Array, user: Array, start: Array, gear: Gear, T: float) -> Array:
     """θ_u and ω_u with which the first swing comes out as recorded."""
-    n = round(FIRST_SWING / w_0 / T)
+    n = round(FIRST_SWING / gear.w_0 / T)
     solved = least_squares(
-        lambda x: _user(shaft[:n], x, w_0, zeta, b, T) - user[:n], start, x_scale=(1.0, w_0), xtol=1e-10
+        lambda x: _user(shaft[:n], x, gear, T) - user[:n], start, x_scale=(1.0, gear.w_0), xtol=1e-10
     )
     return np.asarray(solved.x)
 

@@ -92,6 +92,11 @@ def _level(gap: Array) -> Array:
     return np.asarray(gap - gap.mean())
 
 
+def held_user(shaft: Array, start: float, b: float) -> Array:
+    """θ_u behind a play in which it stays where it was pushed. [rad]"""
+    return np.asarray(_user(shaft, start, b, 1.0, 0.0, np.inf))
+
+
 @njit(nogil=True)
 def _user(shaft: Array, start: float, b: float, side: float, centre: float, holds: float) -> Array:
     """θ_u behind a play, from where it starts. [rad]"""

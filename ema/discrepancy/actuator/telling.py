@@ -12,7 +12,7 @@ from ema.core.names import FAULTS
 from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
 from ema.effects import registry
 
-from . import repeating
+from . import controller, repeating
 from .candidates import Candidate
 from .extension import as_extension
 from .fit import Fit
@@ -50,6 +50,7 @@ def told(search: Search, before: Model, after: Model, v: Verdict, alike: list[tu
     if verdict == "unexplained" or (after.effects and not v.is_noise):
         base = Model((), before.fit, before.heldout) if odd or too_little else after  # beside what is named
         shape = structure(search.torques(base), search.plant.plant.control.rate, v.scores)
+        shape["sentences"] += controller.said(search.plant.plant, search.plant.data.signals)
         shape["sentences"] += repeating.said(repeating.repeating(search, base.fit.point))
     if verdict == "explained" and not v.is_noise:
         notes.append("a small rest above noise is left: the true law has another form than the library's")
