@@ -25,6 +25,8 @@ FOLLOWS = 0.7  # coherence from which the currents say where the rotor's zero is
 SIXTH = np.pi / 3.0  # electrical; by so much the phases' names and signs turn a three-phase motor into itself
 MAX_REST = 0.25  # [rad] electrical, beyond what resolvers are out of adjustment and the method errs (0.12 rad)
 MIN_SAMPLES = 1000
+UNSEEN = 1e-4  # share of a term that the others leave, squared, from which it has a say
+SLOW = 2.0  # [rad/s] of the rotor, over which friction changes its sign
 POLE_PAIRS = range(1, 25)
 
 
@@ -123,14 +125,25 @@ def alignment(i_abc: np.ndarray, theta_m: np.ndarray, p: int, rate: float) -> Al
         squared = np.sum(x * x)  # the torque's sign drops out
         coherence = float(np.abs(squared) / max(np.sum(np.abs(x) ** 2), 1e-30))
         angle = 0.5 * np.angle(squared)
-        # the torque accelerates the rotor: of the two directions take the one in which current and acceleration agree
-        torque = np.real(x * np.exp(-1j * angle))
-        speed = np.gradient(theta_m, 1.0 / rate, axis=-1)
-        acceleration = np.gradient(_smooth(speed, rate), 1.0 / rate, axis=-1)
-        if np.sum(_smooth(torque, rate) * acceleration) < 0:
+        if _opposes(_smooth(np.real(x * np.exp(-1j * angle)), rate), theta_m, rate):
             angle += np.pi
         found.append(Alignment(float(np.angle(np.exp(1j * (angle + np.pi / 2)))), swapped, coherence))
     return max(found, key=lambda alignment: alignment.coherence)
+
+
+def _opposes(torque: np.ndarray, theta_m: np.ndarray, rate: float) -> bool:
+    """Whether a torque has the wrong sign: it must accelerate the rotor and overcome its friction.
+
+    A spring at the user may take more than both, against the acceleration of a sine; so what goes with the position is
+    set aside, and each of the two has a say by as much as it is seen beside it.
+    """
+    speed = _smooth(np.gradient(theta_m, 1.0 / rate, axis=-1), rate)
+    acceleration = np.gradient(speed, 1.0 / rate, axis=-1)
+    terms = [x.ravel() for x in (acceleration, np.tanh(speed / SLOW), theta_m, np.ones_like(theta_m))]
+    X = np.stack([x / max(float(np.linalg.norm(x)), 1e-300) for x in terms], axis=1)
+    inverse = np.linalg.inv(X.T @ X + UNSEEN * np.eye(len(terms)))
+    seen = 1.0 / np.sqrt(np.diag(inverse))  # what the other terms leave of each
+    return bool((inverse @ X.T @ torque.ravel() * seen)[:2].sum() < 0.0)
 
 
 def _smooth(x: np.ndarray, rate: float) -> np.ndarray:

@@ -29,6 +29,17 @@ def test_the_rotor_zero_is_found(theta_0, k):
     assert found.coherence > 0.7
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("stiffness", [0.0, 15000.0])
+@pytest.mark.parametrize("f", [2.0, 8.0])
+def test_a_spring_that_drives_the_rotor_does_not_turn_the_sign_of_the_currents(sign, stiffness, f):
+    """Against it the torque is opposite to the acceleration of a sine; friction still tells which sign is right."""
+    command = 5e-3 * np.sin(2 * np.pi * f * PLANT.time())
+    r = hf.simulate(PLANT, np.zeros(6), command, seeds=3, effects={"spring_load": {"stiffness": stiffness}})
+    found = alignment(sign * r.i, r.theta_m, PLANT.motor.p, PLANT.control.rate)
+    assert abs(found.theta_0) == pytest.approx(0.0 if sign > 0.0 else np.pi, abs=0.12)
+
+
 def test_exchanged_phases_are_found():
     r = hf.simulate(turned(0.4), np.zeros(6), seeds=3)
     found = alignment(r.i[:, [0, 2, 1]], r.theta_m, PLANT.motor.p, PLANT.control.rate)
