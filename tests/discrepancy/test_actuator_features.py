@@ -111,10 +111,12 @@ def test_drag_and_friction_at_the_user_do_not_hide_its_resonance(hidden, shipped
     assert found.k2 == pytest.approx(0.0, abs=0.003)
 
 
-@pytest.mark.parametrize("flaws", [{}, {"k2": 0.1}, {"load": 3.0}, {"spring": 1500.0, "holding": 0.5}])
+@pytest.mark.parametrize(
+    "flaws", [{}, {"k2": 0.1}, {"load": 3.0}, {"spring": 1500.0, "holding": 0.5}, {"position_delay": 1e-3}]
+)
 def test_a_stiff_gear_has_no_resonance(hidden, shipped_plant, flaws):
-    stiff = hidden.cycle(hidden.Flaws(**flaws), hidden.chirp(), hidden.rest(), 1)
-    assert resonance(shipped_plant, prepared(shipped_plant, [stiff])) is None
+    stiff = hidden.cycles(hidden.Flaws(**flaws), 2, 1)
+    assert resonance(shipped_plant, prepared(shipped_plant, stiff)) is None
 
 
 def test_the_control_balance_of_a_sound_actuator_is_small(hidden, shipped_plant):

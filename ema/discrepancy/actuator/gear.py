@@ -35,7 +35,9 @@ WIDER = (1.0, 4.0)  # times the nominal backlash
 NONE, HELD_BACK = (0.0, 0.0), ((30.0, 1e-3), (30.0, 5.0))  # C_u/J_u [1/s] and F_u/J_u [rad/s²] to begin with
 LOUD = 3.0  # times the noise of θ_u, from where what a user without friction leaves is asked for it
 CLEAR = 0.7  # share of the squared gap's change from which a resonance is worth simulating
+CLEARER = 0.2  # of what play or a user without friction leaves, where friction at the user is asked for
 INERTIAS = (2e-3, 9.0)  # [kg m²]
+RINGS = 0.4  # damping ratio
 N_CYCLES = 4
 N_TURNS, N_STEPS = 2, 28  # turns of a fit, steps of each per parameter
 FIRST_SWING = 8.0  # [rad] of the resonance
@@ -68,6 +70,11 @@ class Gear(NamedTuple):
     b: float
     drag: float = 0.0
     friction: float = 0.0
+
+    @property
+    def rings(self) -> bool:
+        """Whether this is a resonance that can be seen, and no mere lag, which a late sensor has too."""
+        return self.w_0 < FREQUENCIES[-1] and self.zeta + 0.5 * self.drag / self.w_0 < RINGS
 
 
 @njit(nogil=True)
@@ -113,7 +120,7 @@ def resonance(plant: Actuator, data: Measured) -> Resonance | None:
     starts = data.start[:n, 0].tolist()
     held = min(_left_by_play(shafts, users, starts, b) for b in backlash(plant.transmission.b, PLAYS).tolist())
     if min(left, held) > as_noise:
-        tried = (_gear(plant, shafts, users, data, c, CLEAR * min(left, held)) for c in HELD_BACK)
+        tried = (_gear(plant, shafts, users, data, c, CLEARER * min(left, held)) for c in HELD_BACK)
         found = min((g for g in tried if g is not None), key=lambda g: g[2], default=found)
     if found is None:
         return None
@@ -168,11 +175,11 @@ def _gear(
             method="Nelder-Mead",
             options={"maxiter": N_STEPS * free.stop},
         )
-        if found.fun > least or (back != NONE and np.exp(found.x[0]) > FREQUENCIES[-1]):
-            return None
         best, left = gear(found.x), float(found.fun)
+        if left > least:
+            return None
         starts = np.array([_started(*of, best, T) for of in zip(shafts, users, starts, strict=True)])
-    return best, starts, left
+    return None if back != NONE and not best.rings else (best, starts, left)
 
 
 def _started(shaft: Array, user: Array, start: Array, gear: Gear, T: float) -> Array:
