@@ -100,6 +100,17 @@ def test_a_resonating_gear_is_seen_in_rotor_and_user(hidden, shipped_plant, k2):
     assert (found.drag, found.friction) == (0.0, 0.0)
 
 
+def test_a_plant_without_play_may_have_a_gear_that_gives(hidden, shipped_plant):
+    transmission = shipped_plant.transmission.model_copy(update={"b": 0.0})
+    plant = shipped_plant.model_copy(update={"transmission": transmission})
+    soft = hidden.cycles(hidden.Flaws(compliance=2e-5, user_damping=30.0), 2, 3)
+    with np.errstate(all="raise"):
+        found = resonance(plant, prepared(plant, soft))
+    assert found is not None
+    assert found.compliance == pytest.approx(2e-5, rel=0.03)
+    assert found.k2 == 0.0
+
+
 def test_drag_and_friction_at_the_user_do_not_hide_its_resonance(hidden, shipped_plant):
     """What the user loses to the fixed world is no damping of the gear: asked for that alone, nothing was found."""
     flaws = hidden.Flaws(compliance=2.5e-5, user_inertia=0.15, user_damping=8.0, user_drag=10.0, user_rubbing=1.0)

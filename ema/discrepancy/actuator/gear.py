@@ -32,6 +32,7 @@ from .play import PLAYS, held_user
 FREQUENCIES = np.geomspace(100.0, 2000.0, 32)  # [rad/s]
 DAMPINGS = (0.01, 0.03, 0.1, 0.3)
 WIDER = (1.0, 4.0)  # times the nominal backlash
+LEAST_PLAY = 1e-8  # [rad at the user] less is none
 NONE, HELD_BACK = (0.0, 0.0), ((30.0, 1e-3), (30.0, 5.0))  # C_u/J_u [1/s] and F_u/J_u [rad/s²] to begin with
 LOUD = 3.0  # times the noise of θ_u, from where what a user without friction leaves is asked for it
 CLEAR = 0.7  # share of the squared gap's change from which a resonance is worth simulating
@@ -126,7 +127,8 @@ def resonance(plant: Actuator, data: Measured) -> Resonance | None:
         return None
     gear, starts, _ = found
     inertia = _inertia(plant, data, [_user(s, start, gear, T) for s, start in zip(shafts, starts, strict=True)])
-    k2 = (gear.b / plant.transmission.b - 1.0) / (backlash(1.0, 1.0) - 1.0)
+    nominal = plant.transmission.b
+    k2 = (gear.b / nominal - 1.0) / (backlash(1.0, 1.0) - 1.0) if nominal > LEAST_PLAY else 0.0
     return Resonance(
         1.0 / (gear.w_0**2 * inertia),
         inertia,
@@ -165,7 +167,8 @@ def _gear(
         cycles = zip(shafts[:N_CYCLES], users, starts, strict=False)
         return sum(float(np.var(user - _user(shaft, start, g, T))) for shaft, user, start in cycles)
 
-    grid = [Gear(w, z, plant.transmission.b * x, *back) for w in FREQUENCIES for z in DAMPINGS for x in WIDER]
+    play = max(plant.transmission.b, LEAST_PLAY)
+    grid = [Gear(w, z, play * x, *back) for w in FREQUENCIES for z in DAMPINGS for x in WIDER]
     best = min(grid, key=misfit)
     left = np.inf
     for _ in range(N_TURNS):  # the gear by the starts, the starts by the gear
