@@ -107,6 +107,18 @@ CASES: dict[str, Case] = {
                                        parameters={"spring_load.stiffness": lambda f: f["spring"]}),
     "gear_compliance": Case(_one("compliance", 5e-6, 3e-5, user_damping=30.0), ("gear_compliance",),
                             parameters={"gear_compliance.compliance": lambda f: f["compliance"]}),
+    "gear_compliance behind a user that rubs": Case(
+        _both(
+            _one("compliance", 1.5e-5, 4e-5, user_inertia=0.15, user_damping=8.0),
+            _one("user_drag", 2.0, 15.0), _one("user_rubbing", 0.3, 2.0),
+        ),
+        ("gear_compliance",),
+        parameters={
+            "gear_compliance.compliance": lambda f: f["compliance"],
+            "gear_compliance.drag": lambda f: f["user_drag"],
+            "gear_compliance.friction": lambda f: f["user_rubbing"],
+        },
+    ),
     "supply_sag": Case(_one("source_resistance", 0.05, 0.4), ("supply_sag",),
                        parameters={"supply_sag.resistance": lambda f: f["source_resistance"]}),
     "dead_time": Case(_one("dead_time", 1e-6, 3e-6), ("dead_time",),

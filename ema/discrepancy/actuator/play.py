@@ -57,8 +57,8 @@ def with_friction(stated: Actuator, taken: Actuator, findings: Findings) -> Find
     if F_u == stated.transmission.F_u or not LOADS & {e.name for e in findings.effects}:
         return findings
     findings.notes.append(
-        "the load presses the user to one side of the play, "
-        + (f"against friction at the user of about {F_u:.2g} N m" if F_u else "nothing at the user holds it there")
+        "the load presses the user to one side of the play: friction at the user is "
+        + (f"about {F_u:.2g} N m" if F_u else "less than the load")
     )
     return replace(findings, fitted={**findings.fitted, "transmission": taken.transmission.model_dump()})
 
