@@ -101,6 +101,8 @@ class Effect:
         Plants in which it has a meaning: ``ema`` (three-phase actuator), ``axis`` (single inertia or mass).
     limits : mapping of str to Limit
         Of parameters that cannot have just any value.
+    least_sd : mapping of str to float
+        Standard deviation below which no estimate is claimed, where honest simulations of the same law differ by it.
     """
 
     name: str
@@ -112,6 +114,7 @@ class Effect:
     plants: tuple[str, ...] = ("ema",)
     besides: Mapping[str, str] = field(default_factory=dict)
     limits: Mapping[str, Limit] = field(default_factory=dict)
+    least_sd: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         unknown = set(self.laws) - set(HOOKS)
