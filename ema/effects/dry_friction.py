@@ -29,3 +29,9 @@ def speed_after(w_m, tau_drive, F_s, F_d, dt_J):
     sliding = F_d if w_m > 0.0 else -F_d
     w_next = w_m + (tau_drive - (held if w_m == 0.0 else sliding)) * dt_J
     return 0.0 if w_m * w_next < 0.0 else w_next
+
+
+@njit(inline="always")
+def rubbing_speed_after(w, tau_drive, F, dt_J):
+    """Speed one step later of an inertia that rubs with F, at rest and in motion; at 0 nothing stops it.   [rad/s]"""
+    return speed_after(w, tau_drive, F, F, dt_J) if F > 0.0 else w + dt_J * tau_drive

@@ -18,7 +18,7 @@ import math
 from numba import njit
 
 from ema.effects import cogging, supply_sag, torque_term
-from ema.effects.dry_friction import speed_after
+from ema.effects.dry_friction import rubbing_speed_after, speed_after
 
 from . import jit  # noqa: F401  (sets the cache folder before anything is compiled)
 from .axis_layout import row
@@ -113,13 +113,6 @@ def gear(z, inertia, h):
     return 1.0 / c, 2.0 * z[ZETA] * math.sqrt(J_m * J_l / inertia / c), J_l
 
 
-@njit(inline="always")
-def load_speed_after(z, w_l, T, h_J):
-    """Speed of the load one step later, with the gear's torque and its own drag and friction. [rad/s]"""
-    F, T = z[LOAD_FRICTION], T - z[LOAD_DRAG] * w_l
-    return speed_after(w_l, T, F, F, h_J) if F > 0.0 else w_l + T * h_J
-
-
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
 def load_after(z, t, theta, h_max, theta_l, w_l):
     """Position and speed of the load, given at t[0], at the end of a recorded motion `theta` of the motor."""
@@ -136,7 +129,7 @@ def load_after(z, t, theta, h_max, theta_l, w_l):
         for s in range(n_steps):
             T = stiffness * (theta[k] + (s + 0.5) * h * w - theta_l - 0.5 * h * w_l) + damping * (w - w_l)
             theta_l += 0.5 * h * w_l
-            w_l = load_speed_after(z, w_l, T, h / J_l)
+            w_l = rubbing_speed_after(w_l, T - z[LOAD_DRAG] * w_l, z[LOAD_FRICTION], h / J_l)
             theta_l += 0.5 * h * w_l
     return theta_l, w_l
 
@@ -234,7 +227,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
                 T = stiffness * (theta_mid - theta_l - 0.5 * h * w_l) + damping * (w - w_l)
                 tau -= T
                 theta_l += 0.5 * h * w_l
-                w_l = load_speed_after(z, w_l, T, h / J_l)
+                w_l = rubbing_speed_after(w_l, T - z[LOAD_DRAG] * w_l, z[LOAD_FRICTION], h / J_l)
                 theta_l += 0.5 * h * w_l
             w_sliding = w if slide == 0.0 else slide * max(w * slide, CREEP)
             F_s, F_d = friction(z, terms, theta_mid, w_sliding, tau, tau_m, i, t_mid)

@@ -12,7 +12,7 @@ from numba import njit
 
 from ema.core.names import CURRENTS, PHASES
 from ema.effects.backlash import creep, deflection, follow
-from ema.effects.dry_friction import speed_after
+from ema.effects.dry_friction import rubbing_speed_after, speed_after
 from ema.effects.inverter import comparator, leg_voltage, share_of_step
 from ema.effects.supply_sag import link_voltage
 from ema.effects.trapezoid import sector, six_step, trap
@@ -187,8 +187,8 @@ def mechanical_step(z, l, N, dt, tau_m, parts, audited):
 
     crept = theta_u - dt * creep(tau_user, z[F_U * N + l])
     if len(parts) & GEAR:
-        F_u, tau_u = z[USER_FRICTION * N + l], tau_gear - tau_user - z[USER_DRAG * N + l] * w_u
-        w_u_next = speed_after(w_u, tau_u, F_u, F_u, dt / J_u) if F_u > 0.0 else w_u + dt / J_u * tau_u
+        tau_u = tau_gear - tau_user - z[USER_DRAG * N + l] * w_u
+        w_u_next = rubbing_speed_after(w_u, tau_u, z[USER_FRICTION * N + l], dt / J_u)
         theta_soft = min(max(theta_u + w_u_next * dt, -stop), stop)
         w_u_next = w_u_next if abs(theta_soft) < stop else 0.0
         z[W_U * N + l] = w_u_next if soft else w_next / gr

@@ -10,7 +10,7 @@ from ema.core.names import CURRENTS
 from ema.core.records import Cycle
 from ema.models.actuator import Actuator
 
-from .features import Array, Signals, motor_torque
+from .features import Array, Signals, motor_torque, reference, reference_terms
 
 MAX_LAG = 6e-3  # [s] no sensor or loop of this plant is that late; channels are apart
 MAX_CLIPPED = 0.1  # share of samples at the largest value
@@ -68,14 +68,9 @@ def _check_synchrony(where: str, s: Signals, plant: Actuator) -> None:
     """Channels that belong together must not be apart by more than any sensor or loop can be late."""
     rate = plant.control.rate
     reach = int(0.05 * rate)
-    tau = motor_torque(plant, s)[0][0]
-    w_m = np.gradient(s.theta_m[0], 1.0 / rate)
-    error = s.theta_cmd[0] - s.theta_u[0]
-    c, I_max = plant.control, plant.inverter.I_max
-    I_ref = np.clip(c.K_w * (c.K_p * error - w_m), -I_max, I_max)
     slow = ", or the current control is far slower than the plant file's"
     pairs = (
-        ("the currents", "position and command", _lag_of_loop(tau, I_ref, (error, -w_m), reach, rate), slow),
+        ("the currents", "position and command", _lag_of_loop(plant, s, reach), slow),
         ("θ_u", "θ_m", _lag(s.theta_u[0], s.theta_m[0], reach), ""),
     )
     for late, early, (lag, correlation), or_else in pairs:
@@ -91,38 +86,40 @@ def _check_synchrony(where: str, s: Signals, plant: Actuator) -> None:
             )
 
 
-def _lag_of_loop(tau: Array, I_ref: Array, terms: tuple[Array, Array], reach: int, rate: float) -> tuple[int, float]:
+def _lag_of_loop(plant: Actuator, s: Signals, reach: int) -> tuple[int, float]:
     """Samples by which the torque is later than what the controller should ask for, and their correlation there.
 
-    Where these do not agree the controller may have other gains, which turn the phase of I_ref: then it is the sum of
-    its `terms` (position error, less speed) with whatever positive gains fit best.
+    Where these do not agree the controller may have other gains, which turn the phase of what it asks for: then that is
+    the sum of its two terms with whatever positive gains fit best.
     """
-    lag, correlation = _lag(tau, I_ref, reach)
-    if abs(lag) <= MAX_LAG * rate and correlation >= FOLLOWING:
+    tau = motor_torque(plant, s)[0][0]
+    lag, correlation = _lag(tau, reference(plant, s)[0], reach)
+    if abs(lag) <= MAX_LAG * plant.control.rate and correlation >= FOLLOWING:
         return lag, correlation
-    x = np.stack([term / np.std(term) for term in terms], axis=1)
-    best = (lag, correlation)
-    for shift in range(-reach, reach + 1, 5):
-        late, early = _shifted(tau, x, shift)
-        late, early = late - late.mean(), early - early.mean(axis=0)
-        gains, left = nnls(early.T @ early, early.T @ late)[0], float(late @ late)
-        r = float(np.sqrt(max(1.0 - float(((late - early @ gains) ** 2).sum()) / left, 0.0))) if left > 0.0 else 0.0
-        if r > best[1] + 1e-6:
-            best = (shift, r)
-    return best
+    terms = reference_terms(plant, s)[:, 0]
+    other = _lag(tau, (terms / terms.std(axis=1, keepdims=True)).T, reach)
+    return max((lag, correlation), other, key=lambda found: found[1])
 
 
 def _lag(x: Array, y: Array, reach: int) -> tuple[int, float]:
-    """Samples by which `x` is later than `y` where they agree best, and their correlation there."""
+    """Samples by which `x` is later than `y` where they agree best, and their correlation there.
+
+    Of several `y`, shape (n_times, n), the sum with positive weights that fits best is taken.
+    """
     best = (0, -1.0)
     for lag in range(-reach, reach + 1, 5):
         a, b = _shifted(x, y, lag)
-        a, b = a - a.mean(), b - b.mean()
-        scale = float(np.sqrt((a @ a) * (b @ b)))
-        r = float(a @ b) / scale if scale > 0.0 else 0.0
+        r = _correlation(a - a.mean(), b - b.mean(axis=0))
         if r > best[1] + 1e-6:
             best = (lag, r)
     return best
+
+
+def _correlation(x: Array, y: Array) -> float:
+    if y.ndim > 1:
+        y = y @ nnls(y.T @ y, y.T @ x)[0]
+    scale = float(np.sqrt((x @ x) * (y @ y)))
+    return float(x @ y) / scale if scale > 0.0 else 0.0
 
 
 def _shifted(x: Array, y: Array, lag: int) -> tuple[Array, Array]:

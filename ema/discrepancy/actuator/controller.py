@@ -11,7 +11,17 @@ import numpy as np
 
 from ema.models.actuator import Actuator
 
-from .features import GROUPS, Signals, current_lag, dc_current, delayed, local_mean, motor_torque, spacing
+from .features import (
+    GROUPS,
+    Signals,
+    current_lag,
+    dc_current,
+    delayed,
+    local_mean,
+    motor_torque,
+    reference_terms,
+    spacing,
+)
 
 FREE = 0.9  # share of I_max up to which a reference is taken as not limited
 FEWEST = 30  # nodes
@@ -21,15 +31,13 @@ OTHER = 0.03  # by which a gain must differ
 
 def gains(plant: Actuator, signals: Sequence[Signals]) -> tuple[float, float] | None:
     """K_p and K_w over the plant file's by which the currents follow; None where that makes little difference."""
-    c, limit = plant.control, plant.inverter.I_max
     lag = current_lag(plant) + 0.5
     A, y = [], []
     for s in signals:
-        m = spacing(GROUPS["control"][0], c.rate, s.theta_m.shape[1])
+        m = spacing(GROUPS["control"][0], plant.control.rate, s.theta_m.shape[1])
         i_q = dc_current(motor_torque(plant, s)[1], s.i)
-        w_m = np.gradient(s.theta_m, 1.0 / c.rate, axis=-1)
-        terms = np.stack([c.K_w * c.K_p * (s.theta_cmd - s.theta_u)[0], -c.K_w * w_m[0]])
-        free = (np.abs(terms.sum(axis=0)) < FREE * limit).astype(float)
+        terms = reference_terms(plant, s)[:, 0]
+        free = (np.abs(terms.sum(axis=0)) < FREE * plant.inverter.I_max).astype(float)
         inside = local_mean(delayed(free, lag), m) > 1.0 - 1e-9
         A.append(local_mean(delayed(terms, lag), m)[:, inside])
         y.append(local_mean(i_q[0], m)[inside])

@@ -155,6 +155,19 @@ def dc_current(theta_e: Array, i: Array) -> Array:
     return np.asarray(0.5 * (_six_step(theta_e) * i).sum(axis=1))
 
 
+def reference_terms(plant: Actuator, signals: Signals) -> Array:
+    """The two terms of what the controller asks for, K_w K_p (θ_cmd - θ_u) and -K_w ω_m, (2, n, n_times). [A]"""
+    c = plant.control
+    w_m = np.gradient(signals.theta_m, 1.0 / c.rate, axis=-1)
+    return np.stack([c.K_w * c.K_p * (signals.theta_cmd - signals.theta_u), -c.K_w * w_m])
+
+
+def reference(plant: Actuator, signals: Signals) -> Array:
+    """Current that the controller asks for, from the channels it sees, (n, n_times). [A]"""
+    limit = plant.inverter.I_max
+    return np.asarray(np.clip(reference_terms(plant, signals).sum(axis=0), -limit, limit))
+
+
 def features(plant: Actuator, signals: Signals) -> dict[str, Array]:
     """The groups of the table above, each (n, n_features)."""
     rate = plant.control.rate
@@ -164,8 +177,7 @@ def features(plant: Actuator, signals: Signals) -> dict[str, Array]:
     tau, theta_e = motor_torque(plant, signals)
     w_m = np.gradient(signals.theta_m, T, axis=-1)
     i_q = dc_current(theta_e, signals.i)
-    c, limit = plant.control, plant.inverter.I_max
-    I_ref = np.clip(c.K_w * (c.K_p * (signals.theta_cmd - signals.theta_u) - w_m), -limit, limit)
+    I_ref = reference(plant, signals)
     lag = current_lag(plant) + 0.5
     smooth = np.apply_along_axis(np.convolve, -1, i_q, np.ones(21) / 21.0, "same")
     at = (theta_e / (2.0 * np.pi)) % 1.0 * SECTORS

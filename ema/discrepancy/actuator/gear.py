@@ -20,7 +20,7 @@ from numba import njit
 from scipy.optimize import least_squares, minimize
 
 from ema.effects.backlash import deflection
-from ema.effects.dry_friction import speed_after
+from ema.effects.dry_friction import rubbing_speed_after
 from ema.faults import backlash
 from ema.models.actuator import Actuator
 
@@ -93,7 +93,7 @@ def _user(shaft: Array, start: Array, gear: Gear, T: float) -> Array:
             push = w_0 * w_0 * twist - drag * w
             if twist != 0.0:
                 push += 2.0 * zeta * w_0 * (w_shaft - w)
-            w = speed_after(w, push, friction, friction, dt) if friction > 0.0 else w + dt * push
+            w = rubbing_speed_after(w, push, friction, dt)
             theta += dt * w
         out[t] = theta
     return out

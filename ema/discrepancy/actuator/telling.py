@@ -151,8 +151,8 @@ def _found(
     for p in e.parameters:
         name = f"{effect}.{p.name}"
         if name in bounds:
-            parts = [fit.sd[name], IMPLEMENTATION * values[p.name], FORM * rest * values[p.name]]
-            parts.append(e.least_sd.get(p.name, 0.0))
+            value, least = values[p.name], e.least_sd.get(p.name, 0.0)
+            parts = [fit.sd[name], IMPLEMENTATION * value, FORM * rest * value, least]
             sd = float(np.linalg.norm([*parts, small if p.unit == "1" and p.name in c.linear else 0.0]))
             f = bounds[name]
             parameters[p.name] = Quantity(
