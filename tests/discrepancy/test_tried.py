@@ -40,10 +40,10 @@ def test_the_actuator(monkeypatch):
     signals = SimpleNamespace(u_dc=np.full(100, 28.0), i=np.full((1, 3, 100), 5.0))
     data = SimpleNamespace(zero=0.0, dT=np.array([0.0, 30.0]), signals=[signals, signals])
     resonance = Resonance(1e-3, 1e-3, damping=0.1, drag=1.0, friction=0.1, k2=0.0, starts=np.zeros((2, 2)))
-    monkeypatch.setattr(actuator, "resonance", lambda plant, data: resonance)
     monkeypatch.setattr(actuator, "lines", lambda torques: [(18.0, 0.5)])
     monkeypatch.setattr(actuator, "bumps", lambda torques: [(0.01, 1e-3)])
-    found = [c for line in ("cogging", "torque_line") for c in actuator.candidates(plant, data, [object()], line)]
+    both = ("cogging", "torque_line")
+    found = [c for line in both for c in actuator.candidates(plant, data, [object()], line, resonance)]
     assert not missed("ema", {c.effect for c in found})
 
 

@@ -18,7 +18,7 @@ from ema.models.actuator import Actuator
 from .cycles import Measured
 from .features import Array
 from .fit import Free, free
-from .gear import resonance
+from .gear import Resonance
 from .plant import Point
 from .weak import Torque, bumps, lines
 
@@ -215,10 +215,17 @@ def _without_filter() -> Candidate:
     return Candidate("current_filter", frees, {}, ("change",), (HARDLY_FILTERED,))
 
 
-def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line: str = "cogging") -> list[Candidate]:
+def candidates(
+    plant: Actuator,
+    data: Measured,
+    torques: Sequence[Torque],
+    line: str = "cogging",
+    gear: Resonance | None = None,
+) -> list[Candidate]:
     """What to try on these cycles; nonlinear parameters where the residual torque suggests them.
 
-    A torque line is tried as the effect `line`: the first is cogging, a further one stands beside it.
+    A torque line is tried as the effect `line`: the first is cogging, a further one stands beside it. `gear` is the
+    resonance that rotor and user show.
     """
     found = [
         _plain("asymmetric_friction", "asymmetry"),
@@ -256,7 +263,6 @@ def candidates(plant: Actuator, data: Measured, torques: Sequence[Torque], line:
         found.append(Seen("adc_saturation", (limit,), {}, ("limit",), (top,)))
     if not torques:
         return found
-    gear = resonance(plant, data)
     if gear is not None:
         step = {"compliance": gear.compliance}
         held_back = {name: x for name, x in (("drag", gear.drag), ("friction", gear.friction)) if x}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from ema.models.layout import STATE
 
 from .cycles import Measured
 from .features import Array, Signals, features, floors, slices, stacked
+from .gear import Resonance, resonance
 from .sampling import straightened
 
 Point = Mapping[str, float]
@@ -62,6 +64,11 @@ class EmaPlant:
         groups = [features(plant, data.signals[c]) for c in self.first]
         self.slices = [slices(g) for g in groups]
         self.floors = [floors(g) for g in groups]
+
+    @cached_property
+    def resonance(self) -> Resonance | None:
+        """Of the gear train, as rotor and user show it."""
+        return resonance(self.plant, self.data)
 
     def neutral(self, name: str) -> float:
         """Value of a parameter that a point does not name: the plant file's own, or neutral."""

@@ -247,7 +247,7 @@ class Search:
     def promising(self, model: Model) -> list[Screened]:
         """All that may stand beside the effects of `model`, by what it promises to first order."""
         line = "torque_line" if "cogging" in model.names else "cogging"
-        found = candidates(self.plant.plant, self.plant.data, self.torques(model), line)
+        found = candidates(self.plant.plant, self.plant.data, self.torques(model), line, self.plant.resonance)
         return self.screen(model, [c for c in found if c.effect not in model.names])
 
     def extend(self, model: Model, screened: Sequence[Screened], known: Sequence[Model] = ()) -> list[Model]:
