@@ -7,6 +7,7 @@ neutral. What a simulation gives is random (switching, sensor noise), so predict
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,7 +28,7 @@ Point = Mapping[str, float]
 Steps = tuple[float, ...] | None  # None: the plant's
 STEPS = (1e-6, 8e-7)  # [s] integration steps of a mean
 NOISE_STEPS = (1e-6, 5e-7, 8e-7, 2e-6)  # [s] integration steps of runs that tell the noise
-CHUNK = 64  # runs in memory at a time
+CHUNK = 64  # runs that a thread has in memory at a time
 CARRIED = 0.03  # [A] at the start, that tells that comparators are switching
 ENVELOPE_STEP = 10  # the envelope is low-passed at 200 Hz: every tenth sample says all
 
@@ -90,19 +91,28 @@ class EmaPlant:
         """
         steps = steps or self.steps
         of = np.array([(seed - seeds[0]) % len(steps) for seed in seeds])
-        which = [np.flatnonzero(of == j).tolist() for j in range(len(steps))]
-        parts = [
-            self._simulate([points[r] for r in w], [cycles[r] for r in w], [seeds[r] for r in w], dt)
+        which = [np.flatnonzero(of == j) for j in range(len(steps))]
+        jobs = [
+            (w[at : at + CHUNK].tolist(), dt)
             for w, dt in zip(which, steps, strict=True)
-            if w
+            for at in range(0, len(w), CHUNK)
         ]
-        back = np.argsort(np.concatenate([w for w in which if w]), kind="stable")
+
+        def run(job: tuple[list[int], float]) -> Runs:
+            w, dt = job
+            return self._simulate([points[r] for r in w], [cycles[r] for r in w], [seeds[r] for r in w], dt)
+
+        # One step often fills one batch of lanes only, which takes one core: the steps run side by side.
+        with ThreadPoolExecutor(self.n_threads) as pool:
+            parts = list(pool.map(run, jobs))
+        self.n_runs += len(seeds)
+        back = np.argsort(np.concatenate([w for w, _ in jobs]), kind="stable")
         return Runs(
             np.concatenate([p.features for p in parts])[back], np.concatenate([p.envelopes for p in parts])[back]
         )
 
     def _simulate(self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], dt: float) -> Runs:
-        d, n = self.data, len(points)
+        d = self.data
         zero_error = self._zero_error(points)
         zero = d.zero - zero_error / self.plant.transmission.GR  # of the user's sensor, if the rotor's is off by that
         command = np.array([d.commands[d.motion[c]] for c in cycles]) + zero[:, None]
@@ -110,7 +120,6 @@ class EmaPlant:
         cycles_ = np.asarray(cycles)
         k = np.array([[point.get(name, 0.0) for name in FAULTS] for point in points])
         k = np.clip(k + d.faults[cycles_], 0.0, 1.0)
-        effects = self._effects(points)
         unseen = self.plant.sensors.lvdt_step * np.array([np.random.default_rng(s).random() - 0.5 for s in seeds])
         theta_m = d.start[cycles_, 1] - zero_error - self._wobble(points, cycles_)
         start = hf.start_at(self.plant, d.start[cycles_, 0] + zero + unseen, theta_m)
@@ -121,33 +130,27 @@ class EmaPlant:
             start[:, STATE.index(f"s_{phase}")] = legs[:, j]
             for name in ("i", "lag1", "lag2"):
                 start[:, STATE.index(f"{name}_{phase}")] = d.holding[cycles_, j]
-        all_features, all_envelopes = [], []
-        for first in range(0, n, CHUNK):
-            part = slice(first, min(first + CHUNK, n))
-            r = hf.simulate(
-                self.plant,
-                k[part],
-                _earlier(command[part], self.late),
-                seeds=np.asarray(seeds)[part],
-                start=start[part],
-                effects={e: {p: x[part] for p, x in values.items()} for e, values in effects.items()},
-                dT=d.dT[cycles_[part]],
-                dt=dt,
-                n_threads=self.n_threads,
-            )
-            theta_m = r.theta_m
-            if d.angle_noise:
-                white = [np.random.default_rng([seed, 1]).standard_normal(theta_m.shape[1]) for seed in seeds[part]]
-                theta_m = theta_m + d.angle_noise * np.array(white)
-            if d.angle_step:
-                theta_m = d.angle_step * np.round(theta_m / d.angle_step)
-            u_dc = r.u_dc if d.signals[cycles[0]].u_dc is not None else None
-            theta_m, theta_u = (straightened(x, d.every) for x in (theta_m, r.theta_u))
-            signals = Signals(r.i, theta_m, theta_u, recorded[part], u_dc)
-            all_features.append(stacked(features(self.plant, signals)))
-            all_envelopes.append(r.envelope[:, ::ENVELOPE_STEP])
-        self.n_runs += n
-        return Runs(np.concatenate(all_features), np.concatenate(all_envelopes))
+        r = hf.simulate(
+            self.plant,
+            k,
+            _earlier(command, self.late),
+            seeds=np.asarray(seeds),
+            start=start,
+            effects=self._effects(points),
+            dT=d.dT[cycles_],
+            dt=dt,
+            n_threads=self.n_threads,
+        )
+        theta_m = r.theta_m
+        if d.angle_noise:
+            white = [np.random.default_rng([seed, 1]).standard_normal(theta_m.shape[1]) for seed in seeds]
+            theta_m = theta_m + d.angle_noise * np.array(white)
+        if d.angle_step:
+            theta_m = d.angle_step * np.round(theta_m / d.angle_step)
+        u_dc = r.u_dc if d.signals[cycles[0]].u_dc is not None else None
+        theta_m, theta_u = (straightened(x, d.every) for x in (theta_m, r.theta_u))
+        signals = Signals(r.i, theta_m, theta_u, recorded, u_dc)
+        return Runs(stacked(features(self.plant, signals)), r.envelope[:, ::ENVELOPE_STEP])
 
     def repeated(
         self, points: Sequence[Point], cycles: Sequence[int], n_seeds: int, seed: int, steps: Steps = None
