@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import compress
@@ -12,22 +12,20 @@ from scipy.interpolate import CubicSpline
 
 from ema import faults
 from ema.core.errors import ConfigError
-from ema.effects import known, registry
-from ema.effects.trapezoid import sector, six_step
+from ema.effects import registry
 
 from . import parts
 from .actuator import Actuator
+from .batch import Effects, cold_start, parameters, start_at
 from .envelope import envelope
 from .hf_kernel import OUTPUTS, integrate
-from .layout import ENERGIES, N_ROWS, N_STATE, STATE, row
+from .layout import ENERGIES, N_ROWS, N_STATE, row
 
 N_LANES = 16
 DT = 1e-6  # [s]
-NO_FILTER = 1e-6  # of the time constants: far below a step
-HELD = 1e9  # [N m] friction at the user that no load overcomes
 N_RING = 64  # control ticks remembered for delays at least
 
-Effects = Mapping[str, Mapping[str, float | np.ndarray]]
+__all__ = ["DT", "N_LANES", "Effects", "Response", "cold_start", "parameters", "simulate", "start_at"]
 
 
 @dataclass(frozen=True)
@@ -62,72 +60,6 @@ class Response:
     def envelope(self) -> np.ndarray:
         """Envelope current of each run, shape (n, n_times). [A]"""
         return envelope(self.i, 1.0 / (self.t[1] - self.t[0]))
-
-
-def parameters(plant: Actuator, k: np.ndarray, effects: Effects, dT: float | np.ndarray = 0.0) -> np.ndarray:
-    """The batch array without state for fault vectors `k` (n, 6): shape (N_ROWS, n). Equations: `ema.faults`."""
-    z = np.zeros((N_ROWS, len(k)))
-    m, inv, g, c, s = plant.motor, plant.inverter, plant.transmission, plant.control, plant.sensors
-    for j, phase in enumerate("abc"):
-        N_j = faults.turns(k[:, 2 + j])
-        z[row(f"R_{phase}")], z[row(f"L_{phase}")], z[row(f"k_{phase}")] = m.R * N_j, m.L * N_j**2, m.k_e * N_j
-    z[row("F_s")], z[row("F_d")] = faults.friction(g.F_s, k[:, 0]), faults.friction(g.F_d, k[:, 0])
-    z[row("F_u")] = HELD if g.F_u is None else g.F_u
-    z[row("b")], z[row("zeta")], z[row("dT")] = faults.backlash(g.b, k[:, 1]), k[:, 5], dT
-    for section, names in (
-        (m, ("p", "theta_0", "phi", "J_m", "C")),
-        (inv, ("V_dc", "h", "I_max")),
-        (g, ("GR", "theta_stop")),
-        (c, ("K_p", "K_w")),
-        (s, ("lvdt_step", "f_lag")),
-    ):
-        for name in names:
-            z[row(name)] = getattr(section, name)
-    for name, effect in registry().items():
-        for parameter in effect.parameters:
-            z[row(f"{name}.{parameter.name}")] = parameter.neutral
-    try:
-        known(effects, "ema")
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
-    for name, values in effects.items():
-        for parameter_name, value in values.items():
-            z[row(f"{name}.{parameter_name}")] = value
-    z[row("J_m")] *= 1.0 + z[row("inertia.change")]
-    z[row("f_lag")] /= np.maximum(1.0 + z[row("current_filter.change")], NO_FILTER)
-    return z
-
-
-def cold_start(plant: Actuator, n: int) -> np.ndarray:
-    """State at rest in the middle of the gap at position zero, shape (n, N_STATE)."""
-    state = np.zeros((n, N_STATE))
-    for phase in "abc":
-        state[:, STATE.index(f"s_{phase}")] = 1.0
-    state[:, STATE.index("u_dc")] = plant.inverter.V_dc
-    return state
-
-
-def start_at(
-    plant: Actuator, theta_u: np.ndarray, theta_m: np.ndarray, theta_cmd: float | np.ndarray = 0.0
-) -> np.ndarray:
-    """State at rest at a measured user position and rotor angle (n,), shape (n, N_STATE).
-
-    Held by stiction off its command, the motor carries the current that the controller asks for in vain, unless that is
-    within the comparators' band: then it has died away.
-    """
-    theta_u, theta_m = np.atleast_1d(theta_u), np.atleast_1d(theta_m)
-    state = cold_start(plant, len(theta_u))
-    state[:, STATE.index("theta_u")] = theta_u
-    state[:, STATE.index("theta_m")] = theta_m
-    I_max = plant.inverter.I_max
-    I_ref = np.clip(plant.control.K_w * plant.control.K_p * (theta_cmd - theta_u), -I_max, I_max)
-    n = [sector(plant.motor.p * angle + plant.motor.theta_0) for angle in theta_m]
-    for phase, turned in (("a", 0.0), ("b", -2.0), ("c", 2.0)):
-        i = np.where(np.abs(I_ref) > plant.inverter.h, I_ref, 0.0) * [six_step(n_j + turned) for n_j in n]
-        for name in (f"i_{phase}", f"lag1_{phase}", f"lag2_{phase}"):
-            state[:, STATE.index(name)] = i
-    state[:, STATE.index("I_ref")] = I_ref
-    return state
 
 
 def simulate(
@@ -178,14 +110,12 @@ def simulate(
     n = len(k)
     merged: dict[str, Mapping[str, float | np.ndarray]] = {**plant.effects, **(effects or {})}
     T = 1.0 / plant.control.rate
-    n_substeps = round(T / dt)
-    if abs(n_substeps * dt - T) > 1e-9 * T or n_substeps < 1:
-        raise ConfigError(f"step {dt:g} s does not divide the control period {T:g} s")
+    n_substeps = _substeps(T, dt)
     command = plant.command() if command is None else np.asarray(command, dtype=float)
     command = np.broadcast_to(np.atleast_2d(command), (n, np.shape(command)[-1]))
     n_recorded = command.shape[1]
     start = cold_start(plant, n) if start is None else np.broadcast_to(np.atleast_2d(start), (n, N_STATE))
-    seeds = np.broadcast_to(np.asarray(seeds), (n,))
+    lvdt_noise, current_noise = _noise(plant, np.broadcast_to(seeds, (n,)) if noise else [], n, n_recorded)
 
     z = parameters(plant, k, merged, dT)
     active = np.array([_is_active(z, name) for name in merged]).reshape(len(merged), n)
@@ -193,17 +123,7 @@ def simulate(
     shared = z[row("clock_skew.shared")].copy()  # batches write to z
     skew = z[row("clock_skew.rate")].copy()
     beyond = np.ceil(np.maximum(skew, 0.0) * n_recorded).astype(int)  # samples that a slow recorder takes later
-    lvdt_noise = np.zeros((n, n_recorded))
-    current_noise = np.zeros((n, 3, n_recorded))
-    if noise:
-        for run, seed in enumerate(seeds):
-            rng = np.random.default_rng(int(seed))
-            lvdt_noise[run] = plant.sensors.lvdt_noise * rng.standard_normal(n_recorded)
-            current_noise[run] = plant.sensors.current_noise * rng.standard_normal((3, n_recorded))
-
-    longest = max(z[row(f"{signal}_delay.time")].max() for signal in ("position", "speed"))
-    ticks = min(longest / (T * (1.0 + shared.min())), n_recorded)  # before the first sample there is nothing to see
-    n_ring = max(N_RING, int(np.ceil(ticks)) + 2)
+    n_ring = _ring(z, T, n_recorded)
 
     n_lanes = 1 if n == 1 else N_LANES
     out = np.empty((n, len(OUTPUTS), n_recorded))
@@ -250,6 +170,33 @@ def simulate(
     channels = dict(zip(OUTPUTS[3:], out.transpose(1, 0, 2)[3:], strict=True))
     energy = {name: z[row(name)].copy() for name in ENERGIES} if audited else {}
     return Response(t=t, i=i, state=z[:N_STATE].T.copy(), energy=energy, **channels)
+
+
+def _substeps(T: float, dt: float) -> int:
+    """Steps of `dt` in a control period `T`."""
+    n = round(T / dt)
+    if abs(n * dt - T) > 1e-9 * T or n < 1:
+        raise ConfigError(f"step {dt:g} s does not divide the control period {T:g} s")
+    return n
+
+
+def _noise(
+    plant: Actuator, seeds: np.ndarray | Sequence[int], n: int, n_recorded: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Noise of the LVDT (n, n_recorded) [rad] and of the currents (n, 3, n_recorded) [A]; none without seeds."""
+    lvdt, current = np.zeros((n, n_recorded)), np.zeros((n, 3, n_recorded))
+    for run, seed in enumerate(seeds):
+        rng = np.random.default_rng(int(seed))
+        lvdt[run] = plant.sensors.lvdt_noise * rng.standard_normal(n_recorded)
+        current[run] = plant.sensors.current_noise * rng.standard_normal((3, n_recorded))
+    return lvdt, current
+
+
+def _ring(z: np.ndarray, T: float, n_recorded: int) -> int:
+    """Control ticks to be remembered for the delays of a batch: before the first sample there is nothing to see."""
+    longest = max(z[row(f"{signal}_delay.time")].max() for signal in ("position", "speed"))
+    ticks = min(longest / (T * (1.0 + z[row("clock_skew.shared")].min())), n_recorded)
+    return max(N_RING, int(np.ceil(ticks)) + 2)
 
 
 def _is_active(z: np.ndarray, name: str) -> np.ndarray:

@@ -23,8 +23,9 @@ from ema.effects.vector_math import TWO_PI, cos, sin
 from . import hf_kernel as m
 from . import jit
 from .actuator import Actuator
+from .batch import parameters, start_at
 from .envelope import smoothed
-from .hf import N_LANES, parameters, start_at
+from .hf import N_LANES
 from .layout import N_STATE, row
 
 DT = 1e-5  # [s]
