@@ -14,6 +14,7 @@ HUBER = 4.0  # residuals beyond this many scales count linearly: a window that d
 WILD = 20.0  # and beyond this many they all count the same when models are compared
 RUNAWAY = 1e4
 LONGEST = 30.0  # scales of a parameter in one step
+N_DAMPINGS = 6  # tried before a fit gives up
 CONVERGED = 0.02  # gain in log-likelihood of a step below which a fit has converged
 
 
@@ -98,6 +99,63 @@ def jacobian(
     return np.stack([(run - here) / step for run, step in zip(runs, steps, strict=True)], axis=1)
 
 
+class _Objective:
+    """Huber's loss of the residuals, and of what is known beforehand, over the values `x` of the free parameters.
+
+    The scale of the residuals is that of `start` throughout.
+    """
+
+    def __init__(
+        self, plant: Plant, free: tuple[Free, ...], start: Point, blocks: tuple[int, ...], frozen: Array | None
+    ):
+        self.plant, self.free, self.start, self.blocks, self.frozen = plant, free, start, blocks, frozen
+        self.low, self.high = np.array([f.low for f in free]), np.array([f.high for f in free])
+        self.scales = np.array([f.scale for f in free])
+        known = [(j, f.start, f.prior) for j, f in enumerate(free) if f.prior is not None]
+        self.prior_slopes = np.zeros((len(known), len(free)))
+        for row, (j, _, sd) in enumerate(known):
+            self.prior_slopes[row, j] = 1.0 / sd
+        self.prior_centre = np.array([f.start for f in free])
+        self.x0 = np.clip(np.array([start[f.name] for f in free]), self.low, self.high)
+        self.residuals0 = self.residuals(self.x0)
+        self.scale = scale_of(self.residuals0)
+
+    def at(self, x: Array) -> Point:
+        return {**self.start, **dict(zip([f.name for f in self.free], x.tolist(), strict=True))}
+
+    def residuals(self, x: Array) -> list[Array]:
+        return self.plant.residuals([self.at(x)], self.blocks)[0]
+
+    def prior(self, x: Array) -> Array:
+        """Deviations from what is known beforehand, in its standard deviations."""
+        return np.asarray(self.prior_slopes @ (x - self.prior_centre))
+
+    def loss(self, r: Array, x: Array) -> float:
+        u = np.minimum(np.abs(r) / self.scale, RUNAWAY)
+        p = self.prior(x) / self.scale
+        return float(np.where(u < HUBER, 0.5 * u * u, HUBER * (u - 0.5 * HUBER)).sum() + 0.5 * (p @ p))
+
+    def slopes(self, x: Array, r: Array) -> Array:
+        n_frozen = 0 if self.frozen is None else self.frozen.shape[1]
+        own = jacobian(self.plant, self.free[n_frozen:], self.at(x), self.blocks, r)
+        return own if self.frozen is None else np.hstack((self.frozen, own))
+
+    def normal(self, J: Array, r: Array, x: Array) -> tuple[Array, Array]:
+        """Normal matrix and gradient with Huber's weights, for parameters in units of their scales."""
+        weight = np.minimum(1.0, HUBER * self.scale / np.maximum(np.abs(r), 1e-300))
+        Js, own = J * self.scales, self.prior_slopes * self.scales
+        return Js.T @ (weight[:, None] * Js) + own.T @ own, Js.T @ (weight * r) + own.T @ self.prior(x)
+
+    def covariance(self, J: Array, scale: float) -> Array:
+        """Of the free parameters, where residuals have this scale."""
+        Js = J * self.scales
+        own = self.prior_slopes * self.scales * scale  # the prior is not loosened by a poor residual
+        A = Js.T @ Js + own.T @ own
+        return np.asarray(
+            np.linalg.pinv(A, rcond=1e-12, hermitian=True) * np.outer(self.scales, self.scales) * scale**2
+        )
+
+
 def fit(
     plant: Plant,
     free: Sequence[Free],
@@ -116,72 +174,31 @@ def fit(
     `frozen`, shape (n_residuals, n_known): slopes of the first `n_known` parameters, taken as they are instead of
     being differenced in every iteration (a few parameters are added to many that are fitted already).
     """
-    free, blocks = tuple(free), tuple(blocks)
-    names = [f.name for f in free]
-    low, high = np.array([f.low for f in free]), np.array([f.high for f in free])
-    scales = np.array([f.scale for f in free])
-    n_frozen = 0 if frozen is None else frozen.shape[1]
-    known = [(j, f.start, f.prior) for j, f in enumerate(free) if f.prior is not None]
-    prior_slopes = np.zeros((len(known), len(free)))
-    for row, (j, _, sd) in enumerate(known):
-        prior_slopes[row, j] = 1.0 / sd
-
-    def at(x: Array) -> Point:
-        return {**start, **dict(zip(names, x.tolist(), strict=True))}
-
-    def residual(x: Array) -> list[Array]:
-        return plant.residuals([at(x)], blocks)[0]
-
-    def slopes(x: Array, r: Array) -> Array:
-        own = jacobian(plant, free[n_frozen:], at(x), blocks, r)
-        return own if frozen is None else np.hstack((frozen, own))
-
-    def prior(x: Array) -> Array:
-        return np.array([(x[j] - centre) / sd for j, centre, sd in known])
-
-    x = np.clip(np.array([start[name] for name in names]), low, high)
-    residuals = residual(x)
-    scale = scale_of(residuals)
-
-    def loss(r: Array, x: Array) -> float:
-        u = np.minimum(np.abs(r) / scale, RUNAWAY)
-        p = prior(x) / scale
-        return float(np.where(u < HUBER, 0.5 * u * u, HUBER * (u - 0.5 * HUBER)).sum() + 0.5 * (p @ p))
-
+    of = _Objective(plant, tuple(free), start, tuple(blocks), frozen)
+    x, residuals = of.x0, of.residuals0
     r = _flat(residuals)
-    here, damping = loss(r, x), 1e-3
-    J = slopes(x, r)
+    here, damping = of.loss(r, x), 1e-3
+    J = of.slopes(x, r)
     for _ in range(max_iterations if free else 0):
-        weight = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(r), 1e-300))
-        Js = J * scales
-        own = prior_slopes * scales
-        A = Js.T @ (weight[:, None] * Js) + own.T @ own
-        g = Js.T @ (weight * r) + own.T @ prior(x)
-        held = ((x <= low) & (g > 0.0)) | ((x >= high) & (g < 0.0))
-        step_taken = False
-        for _ in range(6):
-            step = _step(A, g, damping, ~held) * scales
-            x_new = np.clip(x + step, low, high)
-            trial = residual(x_new)
+        A, g = of.normal(J, r, x)
+        held = ((x <= of.low) & (g > 0.0)) | ((x >= of.high) & (g < 0.0))
+        for _ in range(N_DAMPINGS):
+            x_new = np.clip(x + _step(A, g, damping, ~held) * of.scales, of.low, of.high)
+            trial = of.residuals(x_new)
             r_new = _flat(trial)
-            there = loss(r_new, x_new)
+            there = of.loss(r_new, x_new)
             if there < here:
-                step_taken = True
                 break
             damping = max(10.0 * damping, 1e-3)
-        if not step_taken:
+        else:
             break
         gained, here, x, r, residuals = here - there, there, x_new, r_new, trial
         damping = max(0.1 * damping, 1e-9)
         if gained < CONVERGED:
             break
-        J = slopes(x, r)
+        J = of.slopes(x, r)
     scale = scale_of(residuals)
-    Js = J * scales
-    own = prior_slopes * scales * scale  # the prior is not loosened by a poor residual
-    A = Js.T @ Js + own.T @ own
-    covariance = np.linalg.pinv(A, rcond=1e-12, hermitian=True) * np.outer(scales, scales) * scale**2
-    return Fit(free, at(x), residuals, covariance, blocks, scale)
+    return Fit(of.free, of.at(x), residuals, of.covariance(J, scale), of.blocks, scale)
 
 
 def _step(A: Array, g: Array, damping: float, moving: NDArray[np.bool_]) -> Array:

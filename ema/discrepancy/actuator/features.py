@@ -150,6 +150,14 @@ def motor_torque(plant: Actuator, signals: Signals) -> tuple[Array, Array]:
     return (plant.motor.k_e * _trap(theta_e) * signals.i).sum(axis=1), theta_e
 
 
+def load_torque(plant: Actuator, tau: Array, theta_m: Array, m: int) -> Array:
+    """Torque that friction and load take, τ_m - J_m dω_m/dt - C ω_m, in means of ±m samples (..., n_nodes). [N m]"""
+    T = 1.0 / plant.control.rate
+    w_m = np.gradient(theta_m, T, axis=-1)
+    inertia, viscous = plant.motor.J_m * acceleration(theta_m, m, T), plant.motor.C * local_mean(w_m, m)
+    return np.asarray(local_mean(tau, m) - inertia - viscous)
+
+
 def dc_current(theta_e: Array, i: Array) -> Array:
     """DC-equivalent current with its sign, from electrical angles and currents by phase (n, 3, n_times). [A]"""
     return np.asarray(0.5 * (_six_step(theta_e) * i).sum(axis=1))
@@ -171,11 +179,9 @@ def reference(plant: Actuator, signals: Signals) -> Array:
 def features(plant: Actuator, signals: Signals) -> dict[str, Array]:
     """The groups of the table above, each (n, n_features)."""
     rate = plant.control.rate
-    T = 1.0 / rate
     n_times = signals.theta_m.shape[1]
     m = {name: spacing(seconds, rate, n_times) for name, (seconds, _, _) in GROUPS.items()}
     tau, theta_e = motor_torque(plant, signals)
-    w_m = np.gradient(signals.theta_m, T, axis=-1)
     i_q = dc_current(theta_e, signals.i)
     I_ref = reference(plant, signals)
     lag = current_lag(plant) + 0.5
@@ -186,9 +192,7 @@ def features(plant: Actuator, signals: Signals) -> dict[str, Array]:
     table = _table(signals.i[:, :, skip:], at[:, :, skip:], sign[:, skip:])
     gap = local_mean(signals.theta_m / plant.transmission.GR - signals.theta_u, m["gap"])
     found = {
-        "torque": local_mean(tau, m["torque"])
-        - plant.motor.J_m * acceleration(signals.theta_m, m["torque"], T)
-        - plant.motor.C * local_mean(w_m, m["torque"]),
+        "torque": load_torque(plant, tau, signals.theta_m, m["torque"]),
         "control": local_mean(i_q - delayed(I_ref, lag), m["control"]),
         "current": local_mean(i_q, m["current"]),
         "tracking": local_mean(signals.theta_u - signals.theta_cmd, m["tracking"]),

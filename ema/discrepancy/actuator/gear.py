@@ -26,7 +26,7 @@ from ema.models.actuator import Actuator
 
 from .conditions import roughness
 from .cycles import Measured
-from .features import GROUPS, Array, acceleration, current_lag, delayed, local_mean, motor_torque, spacing
+from .features import GROUPS, Array, acceleration, current_lag, delayed, load_torque, local_mean, motor_torque, spacing
 from .play import PLAYS, held_user
 
 FREQUENCIES = np.geomspace(100.0, 2000.0, 32)  # [rad/s]
@@ -202,12 +202,13 @@ def _inertia(plant: Actuator, data: Measured, users: list[Array]) -> float:
         m = spacing(GROUPS["torque"][0], plant.control.rate, len(user))
         theta_m, user = (delayed(x, current_lag(plant)) for x in (s.theta_m[0], user))
         w_m = np.gradient(theta_m, T)
-        tau = local_mean(motor_torque(plant, s)[0][0], m)
+        motor = motor_torque(plant, s)[0][0]
+        tau = local_mean(motor, m)
         signs, speed = local_mean(np.tanh(w_m / 2.0), m), local_mean(w_m, m)
         a_u = acceleration(user, m, T)
         moving = np.abs(speed) > MOVING
         A.append(np.stack([a_u / plant.transmission.GR, signs, speed, tau, np.ones_like(tau)])[:, moving])
-        y.append((tau - plant.motor.J_m * acceleration(theta_m, m, T) - plant.motor.C * speed)[moving])
+        y.append(load_torque(plant, motor, theta_m, m)[moving])
     A.append(np.array([[0.0, 0.0, 0.0, REST / SCALE, 0.0]]).T)
     y.append(np.zeros(1))
     coefficients, *_ = np.linalg.lstsq(np.concatenate(A, axis=1).T, np.concatenate(y), rcond=1e-9)

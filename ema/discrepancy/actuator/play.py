@@ -19,7 +19,7 @@ from ema.effects.backlash import follow
 from ema.models.actuator import Actuator
 
 from .cycles import Measured
-from .features import GROUPS, Array, acceleration, local_mean, motor_torque, spacing
+from .features import GROUPS, Array, load_torque, local_mean, motor_torque, spacing
 
 LOADS = {"constant_load", "spring_load", "position_torque"}
 CLEAR = 0.3  # share of the gap's squared rest below which the user is taken as moved by its load
@@ -124,6 +124,5 @@ def _stiffness(plant: Actuator, data: Measured) -> float:
         w_m = np.gradient(s.theta_m[0], T)
         terms = (s.theta_u[0], np.tanh(w_m / SPEED), w_m, np.ones_like(w_m))
         A.append(np.stack([local_mean(x, m) for x in terms], axis=1))
-        tau = local_mean(motor_torque(plant, s)[0][0], m)
-        y.append(tau - plant.motor.J_m * acceleration(s.theta_m[0], m, T))
+        y.append(load_torque(plant, motor_torque(plant, s)[0][0], s.theta_m[0], m))
     return GR * float(np.linalg.lstsq(np.concatenate(A), np.concatenate(y), rcond=None)[0][0])
