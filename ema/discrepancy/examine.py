@@ -33,6 +33,7 @@ from .verdict import Verdict, judge
 MAX_EFFECTS = 3
 MAX_TERMS = 3
 MAX_ADDED = 5  # of both kinds, further lines of a kind that is there already counted too
+IMMATERIAL = 0.01  # of the noise's mean square: what takes less is told, and no cause: no plant file is that exact
 MANY = 12  # free parameters from which an effect is revised beside its strongest rivals only
 N_RIVALS = 6
 EXPLAINED = 1.2  # held-out residual over noise up to which a model counts as explaining the data
@@ -49,6 +50,8 @@ class _State:
     rounds: list[tuple[dict[str, Tried], Tried]]
     tried: list[dict[str, Any]]
     n_rounds: int = 0
+    library_only: bool = False  # no nameless terms
+    immaterial: str = ""  # what ended the selection by taking less than matters
 
 
 def examine(plant: Plant, progress: Progress = silent) -> Outcome:
@@ -60,6 +63,7 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
     notes: list[str] = []
     _select(plant, state, progress)
     _revise(plant, state, progress)
+    state = _without_terms(plant, state, progress)
     trust = _without_unlikely(plant, state, progress)
     plain = state.plain
     verdict = _judged(plant, plain)
@@ -76,9 +80,11 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
     if outcome == "adequate" and not verdict.is_noise:
         notes.append(
             f"what is left is {verdict.rms:.3g} times the noise and not white ({verdict.because}, "
-            f"p = {verdict.p_value:.1g}), and no effect and no term foretells held-out parts better: filtered, "
-            "quantised or held channels can look like this, and so can something small that is missing"
+            f"p = {verdict.p_value:.1g}), and no effect and no term foretells held-out parts better by what matters: "
+            "filtered, quantised or held channels can look like this, and so can something small that is missing"
         )
+        if state.immaterial:
+            notes.append(f"{state.immaterial}: too little for a cause")
     last = _judged(plant, state.model)
     names = [f.name for f in plant.base]
     return Outcome(
@@ -150,6 +156,9 @@ def _select(plant: Plant, state: _State, progress: Progress) -> None:
             return
         if len(state.model.accepted) >= MAX_ADDED:
             return
+        if (mark := above_noise(state.model) - above_noise(trials[best])) < IMMATERIAL:
+            state.immaterial = f"{candidate.key} would take {mark:.1%} of the noise's mean square from it"
+            return
         n = len(state.model.accepted)
         again = _leave_out(plant, trials[best], {n})
         if compare(again, state.model).gain > 0.0 and not is_worth_it(trials[best], again):
@@ -160,6 +169,22 @@ def _select(plant: Plant, state: _State, progress: Progress) -> None:
             continue
         state.rounds.append((trials, state.model))
         state.model = trials[best]
+
+
+def _without_terms(plant: Plant, state: _State, progress: Progress) -> _State:
+    """Effects of the library alone, where they foretell held-out parts as well as with nameless terms.
+
+    One term may do what two effects do: friction that knows directions beside a spring is a force along the travel.
+    """
+    if not any(c.is_structure for c in state.model.accepted):
+        return state
+    progress("effects of the library alone")
+    other = _State(state.plain, state.plain, [], state.tried, state.n_rounds, library_only=True)
+    _select(plant, other, progress)
+    _revise(plant, other, progress)
+    few = len(other.model.accepted) <= len(state.model.accepted) + 1
+    as_well = _is_explained(plant, other.plain, other.model) and not compare(state.model, other.model).is_clear
+    return other if few and as_well else state
 
 
 def _strongest(trials: dict[str, Tried], before: Tried) -> set[str]:
@@ -175,7 +200,9 @@ def _round(
     number = state.n_rounds
 
     def suggest(point: Point, blocks: Sequence[int]) -> Sequence[Candidate]:
-        everything = [*plant.candidates(point, blocks), *plant.structure(point, blocks)]
+        everything = [*plant.candidates(point, blocks)]
+        if not state.library_only:
+            everything += plant.structure(point, blocks)
         return [c for c in everything if only is None or c.key in only]
 
     trials = one_more(plant, model, suggest, lambda key: progress(f"round {number}: {key}"))

@@ -7,7 +7,7 @@ from .base import SOME_LEFT, Effect, Parameter
 EFFECT = Effect(
     name="inertia",
     parameters=(Parameter("change", "1", 0.0, -0.8, 3.0, 0.05, "relative change of inertia or mass"),),
-    sentence="the moving inertia differs by {change:+.1%}",
+    sentence="the moving inertia differs by {change:+.2%}",
     separated_by="weighing, or a known load that changes only the torque",
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema", "axis"),

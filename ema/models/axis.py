@@ -22,7 +22,7 @@ MODES = {
     "force": kernel.FORCE,
     "speed-loop": kernel.SPEED_LOOP,
 }
-BETWEEN = {"straight": kernel.STRAIGHT, "held": kernel.HELD, "held before": kernel.HELD_BEFORE}
+BETWEEN = {"straight": kernel.STRAIGHT, "held": kernel.HELD, "held before": kernel.HELD_BEFORE, "fast": kernel.FAST}
 Effects = Mapping[str, Mapping[str, float]]
 
 
@@ -107,6 +107,7 @@ def simulate(
         ±1 where the axis slides that way throughout the window, 0 where it may rest or turn round.
     between : str
         What the drive does from one sample to the next: runs straight, is held, or is that of the next (held before).
+        A speed loop acts once a sample, or (fast) between samples too.
     """
     slide = np.zeros(len(starts)) if slide is None else slide
     dT = np.zeros(len(starts)) if dT is None else dT

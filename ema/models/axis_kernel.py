@@ -25,7 +25,8 @@ from .axis_layout import row
 from .hooks import combined
 
 CURRENT, VOLTAGE, FORCE, SPEED_LOOP = range(4)
-STRAIGHT, HELD, HELD_BEFORE = range(3)  # what a recorded drive does from one sample to the next
+# What a recorded drive does from one sample to the next; FAST: a speed loop acts there too, on a command that is held.
+STRAIGHT, HELD, HELD_BEFORE, FAST = range(4)
 CREEP = 1e-9  # [rad/s] at least, where the axis is known to slide
 OUTPUTS = ("theta_m", "w_m", "i_q", "u_q")
 
@@ -161,7 +162,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
         CURRENT, VOLTAGE, FORCE or SPEED_LOOP: what `drive` is (current, voltage, force, commanded speed).
     between : int
         STRAIGHT, HELD or HELD_BEFORE: from sample to sample the drive runs straight, holds the value of the first, or
-        that of the second (a commanded speed is always held).
+        that of the second. A commanded speed is held; its loop acts once a sample, or (FAST) between samples too.
     t, drive : arrays, shape (n_times,)
         Sample times and the recorded drive.
     start : array, shape (4,)
@@ -205,7 +206,8 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
             x = (s + 0.5) / n_steps
             t_mid = t[k] + x * (t[k + 1] - t[k])
             if mode == SPEED_LOOP:
-                i = i_here
+                since = w + 0.5 * dw - out[1, k] if between == FAST else 0.0
+                i = min(max(i_here - z[K_W] * since, -z[I_MAX]), z[I_MAX])
             else:
                 share = x if between == STRAIGHT else 0.0 if between == HELD else 1.0
                 u = (drive[k] + share * (drive[k + 1] - drive[k]) - z[OFFSET]) * gain

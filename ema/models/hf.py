@@ -23,6 +23,7 @@ from .layout import ENERGIES, N_ROWS, N_STATE, row
 
 N_LANES = 16
 DT = 1e-6  # [s]
+N_BEYOND = 32
 N_RING = 64  # control ticks remembered for delays at least
 
 __all__ = ["DT", "N_LANES", "Effects", "Response", "cold_start", "parameters", "simulate", "start_at"]
@@ -121,8 +122,8 @@ def simulate(
     active = np.array([_is_active(z, name) for name in merged]).reshape(len(merged), n)
     z[:N_STATE] = start.T
     shared = z[row("clock_skew.shared")].copy()  # batches write to z
-    skew = z[row("clock_skew.rate")].copy()
-    beyond = np.ceil(np.maximum(skew, 0.0) * n_recorded).astype(int)  # samples that a slow recorder takes later
+    clocks = z[[row(f"clock_skew.{name}") for name in ("rate", "currents", "late")]].T.copy()
+    beyond = _beyond(clocks, T, n_recorded)
     n_ring = _ring(z, T, n_recorded)
 
     n_lanes = 1 if n == 1 else N_LANES
@@ -149,9 +150,7 @@ def simulate(
         )
         z[:, runs] = zb.reshape(N_ROWS, n_lanes)[:, : len(runs)]
         for run, channels in zip(runs, ob.transpose(2, 0, 1), strict=False):
-            if skew[run]:
-                channels = CubicSpline(np.arange(channels.shape[1]) * T, channels, axis=1)(t * (1.0 + skew[run]))
-            out[run] = channels
+            out[run] = _sampled(channels, t, clocks[run]) if clocks[run].any() else channels
 
     of, kinds = np.unique(np.stack([shared, beyond, *active]), axis=1, return_inverse=True)
     alike = [np.flatnonzero(kinds.ravel() == kind) for kind in range(of.shape[1])]  # equations, steps, length of a step
@@ -170,6 +169,23 @@ def simulate(
     channels = dict(zip(OUTPUTS[3:], out.transpose(1, 0, 2)[3:], strict=True))
     energy = {name: z[row(name)].copy() for name in ENERGIES} if audited else {}
     return Response(t=t, i=i, state=z[:N_STATE].T.copy(), energy=energy, **channels)
+
+
+def _beyond(clocks: np.ndarray, T: float, n_recorded: int) -> np.ndarray:
+    """Samples that a slow recorder takes after the end, in steps of `N_BEYOND` so that like runs share a batch."""
+    rate, currents, late = clocks.T
+    last = np.maximum((rate * n_recorded), (rate + currents) * n_recorded + late / T)
+    return N_BEYOND * np.ceil(np.maximum(last, 0.0) / N_BEYOND).astype(int)
+
+
+def _sampled(channels: np.ndarray, t: np.ndarray, clocks: np.ndarray) -> np.ndarray:
+    """Outputs of a run (n_outputs, n_ticks) as a recorder with other clocks samples them, (n_outputs, n_times)."""
+    rate, currents, late = clocks
+    course = CubicSpline(np.arange(channels.shape[1]) * (t[1] - t[0]), channels, axis=1)
+    sampled = course(t * (1.0 + rate))
+    if currents or late:  # before the first tick there is nothing to see
+        sampled[:3] = course(np.maximum(t * (1.0 + rate + currents) + late, 0.0))[:3]
+    return np.asarray(sampled)
 
 
 def _substeps(T: float, dt: float) -> int:

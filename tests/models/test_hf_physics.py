@@ -10,6 +10,7 @@ from ema.core import config, resources
 from ema.effects import registry
 from ema.models import hf
 from ema.models.actuator import Actuator
+from ema.models.envelope import envelope
 from ema.models.layout import STATE
 
 PLANT = config.load(resources.config("actuator.yaml"), Actuator)
@@ -228,6 +229,16 @@ def test_a_slow_recorder_sees_the_motion_early_to_the_end(nominal):
     longer = runs(command=np.append(PLANT.command(), np.full(50, PLANT.command()[-1])), noise=False)
     seen = np.interp(t * (1.0 + late), longer.t, longer.theta_m[0])
     assert np.abs(recorded.theta_m[0] - seen).max() < 1e-4 * np.ptp(seen)
+
+
+@pytest.mark.parametrize(("currents", "late"), [(0.0, 2e-4), (1e-3, -3e-4), (-1e-3, 1e-3)])
+def test_currents_may_have_a_clock_of_their_own(nominal, currents, late):
+    recorded = runs(effects={"clock_skew": {"currents": currents, "late": late}}, noise=False)
+    longer = runs(command=np.append(PLANT.command(), np.full(50, PLANT.command()[-1])), noise=False)
+    seen = np.interp(nominal.t * (1.0 + currents) + late, longer.t, envelope(longer.i, PLANT.control.rate)[0])
+    inside = slice(200, -200)  # the envelope's filter has ends
+    assert np.abs(envelope(recorded.i, PLANT.control.rate)[0] - seen)[inside].max() < 0.02 * seen.max()
+    np.testing.assert_allclose(recorded.theta_m, longer.theta_m[:, : len(nominal.t)], atol=1e-9)
 
 
 def test_a_run_does_not_mind_a_slow_recorder_beside_it():

@@ -3,6 +3,9 @@
 A current that is measured runs (nearly) straight from sample to sample. One that a controller or another simulation
 commands is held: from the sample on, or, where the recorder writes it after it has acted, up to the sample. Taken for
 the other, both position and speed seem half a sample late or early.
+
+A speed loop may act once for each sample of the record, or faster. Taken for the other, its axis seems heavier or
+lighter by half a sample in the loop's time constant; where the record does not show which, only what both say is known.
 """
 
 from __future__ import annotations
@@ -24,30 +27,66 @@ NO_MORE = 0.02  # mean square above noise that does not count
 NEARLY_HALF = 0.25  # samples by which half a sample may be missed
 ALIKE, LITTLE = 1.05, 2e-3  # times what is left, or share in power of what there was: fewer effects are preferred
 SAID = {
-    "held": "each value is held until the next",
-    "held before": "each value has been held since the last",
+    "held": "between samples the recorded drive does not run straight: each value is held until the next",
+    "held before": "between samples the recorded drive does not run straight: each value has been held since the last",
+    "fast": "the speed loop acts between the samples of the record too",
 }
 
 
 def examined(plant: AxisPlant, progress: Progress = silent) -> Outcome:
     """`examine`, with the drive between samples as the record shows it; told where it does not run straight."""
-    if plant.plant.drive == "speed-loop" or all(w.static for w in plant.windows):
+    if all(w.static for w in plant.windows):
         return examine(plant, progress)
     progress("the drive between samples")
     plant.between = _of_plain(plant)
     outcome = examine(plant, progress)
-    here, there = plant.between, _beside(plant, outcome)
+    here = plant.between
+    there = _beside(plant, outcome)
+    if there == here:
+        there = _doubted(plant, outcome)
     if there != here:
         progress(f"again, with a drive that is {there} between samples")
         plant.between = there
         other = examine(plant, progress)
+        alike = plant.plant.drive == "speed-loop" and _alike(other, outcome)
         if _is_simpler(other, outcome):
-            outcome = other
+            outcome, other = other, outcome
         else:
             plant.between = here
+        if alike:
+            _widen(outcome, other)
+            outcome.notes.append(
+                "the record does not show whether the speed loop acts between its samples too: intervals hold both"
+            )
+            return outcome
     if plant.between in SAID:
-        outcome.notes.append(f"between samples the recorded drive does not run straight: {SAID[plant.between]}")
+        outcome.notes.append(SAID[plant.between])
     return outcome
+
+
+def _doubted(plant: AxisPlant, outcome: Outcome) -> str:
+    """Another way that what was found, or not, may come from."""
+    if plant.plant.drive == "speed-loop" and outcome.effects:
+        return "fast" if plant.between == "straight" else "straight"
+    if plant.between != "straight" and outcome.verdict == "unexplained":
+        return "straight"  # what looked like a drive that is held may have been something that is missing
+    return plant.between
+
+
+def _alike(one: Outcome, other: Outcome) -> bool:
+    """Whether two outcomes name the same effects and leave nearly the same."""
+    rests = sorted(max(r.rms_after for r in o.records) for o in (one, other))
+    names = [sorted(e["name"] for e in o.effects) for o in (one, other)]
+    return names[0] == names[1] and rests[1] < ALIKE * rests[0]
+
+
+def _widen(outcome: Outcome, other: Outcome) -> None:
+    """Let the intervals of an outcome hold those of another one with the same effects."""
+    theirs = {e["name"]: e["parameters"] for e in other.effects}
+    for effect in outcome.effects:
+        for name, own in effect["parameters"].items():
+            if (there := theirs[effect["name"]].get(name)) is not None:
+                own["low"], own["high"] = min(own["low"], there["low"]), max(own["high"], there["high"])
 
 
 def _of_plain(plant: AxisPlant) -> str:
@@ -56,10 +95,14 @@ def _of_plain(plant: AxisPlant) -> str:
     n_free = sum(len(f.free) for f in straight.fits)
     if judge(straight.held_out, noise_uncertainty=plant.noise_uncertainty, n_free=n_free).is_noise:
         return "straight"
-    tried = {"straight": straight, **{way: _plain(plant, way) for way in SAID}}
+    tried = {way: straight if way == "straight" else _plain(plant, way) for way in _ways(plant)}
     best = min(tried, key=lambda way: tried[way].rms)
     much = above_noise(tried[best]) < MUCH * above_noise(straight)
     return best if much and compare(tried[best], straight).is_clear else "straight"
+
+
+def _ways(plant: AxisPlant) -> tuple[str, ...]:
+    return ("straight", "fast") if plant.plant.drive == "speed-loop" else tuple(LATE)
 
 
 def _plain(plant: AxisPlant, way: str) -> Tried:
@@ -69,6 +112,8 @@ def _plain(plant: AxisPlant, way: str) -> Tried:
 
 def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     """The way that leaves less though nothing was fitted for it, or held where all sensors are half a sample late."""
+    if plant.plant.drive == "speed-loop":
+        return plant.between
     blocks = range(len(plant.blocks))
     period = float(np.median([w.period for w in plant.windows if not w.static]))
     here = plant.between
@@ -96,9 +141,11 @@ def _less_late(point: Point, by: float) -> Point:
 
 
 def _is_simpler(other: Outcome, one: Outcome) -> bool:
-    """Whether less is left, or hardly more by fewer effects."""
+    """Whether less is left, hardly more by fewer effects, or far less by more."""
     rest, other_rest = (max(r.rms_after for r in o.records) for o in (one, other))
-    if len(other.effects) >= len(one.effects):
-        return len(other.effects) == len(one.effects) and other_rest < rest
+    if len(other.effects) > len(one.effects):
+        return other_rest**2 - 1.0 < MUCH * (rest**2 - 1.0)
+    if len(other.effects) == len(one.effects):
+        return other_rest < rest
     hardly = LITTLE * max(r.rms_before for r in one.records) ** 2
     return other_rest < ALIKE * rest or other_rest**2 < rest**2 + hardly

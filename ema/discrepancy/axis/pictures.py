@@ -75,7 +75,7 @@ def _torque(plant: AxisPlant, before: Point, after: Point) -> Picture:
     left.set_ylabel("torque residual, amplitude")
     right.set_xlabel("speed")
     right.set_ylabel("torque residual")
-    left.legend(fontsize="small")
+    right.legend(fontsize="small", markerscale=6)
     return picture(
         "What the model lacks", "Torque that the model cannot account for, along the measured motion.", figure
     )

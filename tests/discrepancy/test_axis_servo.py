@@ -1,0 +1,49 @@
+"""Speed loops that act faster than the record, and a motor that saturates (tests/support/servo.py)."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import pytest
+
+from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.models.axis_config import RotaryAxis
+
+ACTS_BETWEEN = "the speed loop acts between the samples of the record too"
+
+
+@pytest.fixture(scope="module")
+def servo(support) -> ModuleType:
+    return support("servo")
+
+
+def look(servo, plant, **hidden):
+    return examined(AxisPlant(RotaryAxis.model_validate(plant), [servo.record(1, **hidden)]))
+
+
+@pytest.mark.parametrize("samples", [True, False])
+def test_how_often_a_speed_loop_acts_is_no_heavier_axis(servo, samples):
+    outcome = look(servo, servo.SPEED_LOOP, samples=samples)
+    assert outcome.verdict == "adequate"
+    assert outcome.effects == []
+    assert (ACTS_BETWEEN in outcome.notes) == (not samples)
+
+
+@pytest.mark.parametrize("samples", [True, False])
+def test_a_heavier_axis_is_named_and_its_interval_holds_the_truth(servo, samples):
+    outcome = look(servo, servo.SPEED_LOOP, samples=samples, inertia=1.05 * 0.0085)
+    assert [e["name"] for e in outcome.effects] == ["inertia"]
+    change = outcome.effects[0]["parameters"]["change"]
+    assert change["low"] - 1e-3 <= 0.05 <= change["high"] + 1e-3
+
+
+def test_a_motor_that_saturates_is_not_taken_for_a_drive_that_is_held(servo):
+    outcome = look(servo, servo.CURRENT, position=True, i_sat=2.5, seconds=4.0)
+    assert "saturation" in [e["name"] for e in outcome.effects]
+    assert not any("between samples" in note for note in outcome.notes)
+
+
+def test_an_inertia_of_half_a_thousandth_is_no_cause(servo):
+    outcome = look(servo, servo.SPEED_LOOP, samples=True, inertia=1.0005 * 0.0085)
+    assert outcome.verdict == "adequate"
