@@ -184,7 +184,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
     R_now = z[R] * resistance_factor(z, 0, 1, z[DT])
     skew = 1.0 + z[SKEW]
     d_w = z[SPEED_DELAY]
-    i, i_end, slope, dw = 0.0, 0.0, 0.0, 0.0
+    i, i_end, asked, slope, dw = 0.0, 0.0, 0.0, 0.0, 0.0
     if mode == VOLTAGE:
         u = (drive[0] - z[OFFSET]) * gain
         i = (u - z[K_E] * emf_factor(z, 0, 1, 0.0, z[DT]) * w) / max(R_now, 1e-9)
@@ -194,20 +194,20 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
             i = (drive[k] - z[OFFSET]) * gain
         elif mode == SPEED_LOOP:
             w_meas = delayed(t, out[1], k, d_w, slope)
-            i = min(max(z[K_W] * (drive[k] - w_meas), -z[I_MAX]), z[I_MAX])
+            asked = z[K_W] * (drive[k] - w_meas)
+            i = min(max(asked, -z[I_MAX]), z[I_MAX])
         out[2, k] = i
         if k == n - 1:
             break
         span = (t[k + 1] - t[k]) * skew
         n_steps = max(1, math.ceil(span / h_max - 1e-9))
         h = span / n_steps
-        i_here = i
         for s in range(n_steps):
             x = (s + 0.5) / n_steps
             t_mid = t[k] + x * (t[k + 1] - t[k])
             if mode == SPEED_LOOP:
                 since = w + 0.5 * dw - out[1, k] if between == FAST else 0.0
-                i = min(max(i_here - z[K_W] * since, -z[I_MAX]), z[I_MAX])
+                i = min(max(asked - z[K_W] * since, -z[I_MAX]), z[I_MAX])
             else:
                 share = x if between == STRAIGHT else 0.0 if between == HELD else 1.0
                 u = (drive[k] + share * (drive[k + 1] - drive[k]) - z[OFFSET]) * gain
