@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from types import ModuleType
 
+import numpy as np
 import pytest
 
+from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.between import examined
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
@@ -42,6 +44,16 @@ def test_a_motor_that_saturates_is_not_taken_for_a_drive_that_is_held(servo):
     outcome = look(servo, servo.CURRENT, position=True, i_sat=2.5, seconds=4.0)
     assert "saturation" in [e["name"] for e in outcome.effects]
     assert not any("between samples" in note for note in outcome.notes)
+
+
+def test_a_drive_with_a_clock_of_its_own_adds_up_to_a_delay(servo):
+    (cycle,) = servo.record(1, position=True, seconds=6.0)
+    t, i_q = cycle["t"], cycle["i_q"]
+    record = Record((Cycle(0, {**cycle.channels, "i_q": np.interp(t * (1.0 + 5e-4), t, i_q)}),))
+    outcome = examined(AxisPlant(RotaryAxis.model_validate(servo.CURRENT), [record]))
+    assert [e["name"] for e in outcome.effects] == ["clock_skew"]
+    found = outcome.effects[0]["parameters"]["currents"]
+    assert found["value"] == pytest.approx(5e-4, rel=0.03)
 
 
 def test_an_inertia_of_half_a_thousandth_is_no_cause(servo):

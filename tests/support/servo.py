@@ -1,7 +1,7 @@
 """A servo whose controller is analogue, or samples; fine steps of Euler's. Shares no code with the models.
 
-The speed loop asks for i = K_w (ω_ref - ω) on a command that is held for each sample of the record; the position loop,
-whose current is recorded as the drive, is always analogue. Torque may saturate with the cube of the current.
+The speed loop asks for i = K_w (ω_ref - ω) on a command that is held for each sample of the record. The position loop,
+whose current is recorded as the drive, is always analogue, its command too. Torque may saturate with the current cubed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ def _run(command, is_position, samples, J, F, C, i_sat, out):
     for k in range(len(command)):
         for s in range(FINE):
             if is_position:
-                i = 6.0 * (command[k] - theta) - 0.25 * w
+                after = command[min(k + 1, len(command) - 1)]
+                i = 6.0 * (command[k] + s / FINE * (after - command[k]) - theta) - 0.25 * w
             elif s == 0 or not samples:
                 i = 0.4 * (command[k] - w)
             if s == 0:

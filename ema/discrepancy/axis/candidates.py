@@ -93,6 +93,7 @@ def library(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candi
     s = sizes(plant)
     found = [c for name in registry() if (c := _candidate(plant, s, name, point)) is not None]
     searched = (
+        _clock_of_the_drive(plant, s, point),
         cogging_candidate(plant, point, blocks),
         gear_candidate(plant, point, blocks),
         stretch_candidate(plant, s, point, blocks),
@@ -120,6 +121,18 @@ def _candidate(plant: AxisPlant, s: Sizes, name: str, point: Point) -> Candidate
         grid = [{**point_, f"{name}.{parameter}": value} for point_ in grid for value in starts]
     neutral = {f.name: nominal[f.name.removeprefix(f"{name}.")] for f in free[:1]}
     return Candidate(name, name, free, tuple(grid), neutral)
+
+
+def _clock_of_the_drive(plant: AxisPlant, s: Sizes, point: Point) -> Candidate | None:
+    """A drive that is sampled by a clock of its own: what it is late by adds up from the record's start to its end."""
+    name = "clock_skew.currents"
+    moving = [w for w in plant.windows if not w.static]
+    if not moving or any(key.startswith("clock_skew.") for key in point):
+        return None
+    sample = s.period / max(float(np.ptp(w.course[0])) for w in moving)  # of clock error, late by one at the end
+    free = (Free(name, "1", -200.0 * sample, 200.0 * sample, sample, 0.2 * sample),)
+    starts = tuple({name: x * sample} for x in (-5.0, -1.0, 1.0, 5.0))
+    return Candidate("clock_skew of the drive", "clock_skew", free, starts, {name: 0.0})
 
 
 # Each builder: parameter → (low, high, starts, scale); the first parameter is the one that switches the effect off.

@@ -32,6 +32,16 @@ class Pack:
         self.direction = np.concatenate(directions) if directions else None
         self.filter = joined(filters) if filters else None
 
+    def drive_by(self, clock: float) -> Array:
+        """The drive at the samples of the motion, where its own interval is off by a share `clock`: straight lines."""
+        if clock == 0.0:
+            return self.drive
+        parts = []
+        for w in self.windows:
+            t, drive = w.course
+            parts.append(np.interp(w.t, t[0] + (t - t[0]) * (1.0 + clock), drive))
+        return np.concatenate(parts)
+
     @cached_property
     def history(self) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.bool_]]:
         """Recorded motion before each window since the one before it: offsets, time, position, whether it follows."""

@@ -159,7 +159,7 @@ class AxisPlant:
         starts = self._starts(pack, model, step)
         starts[:, 0] += zero
         drive = pack.bench.roles.kind
-        record = (pack.offsets, pack.t, pack.drive, starts)
+        record = (pack.offsets, pack.t, pack.drive_by(model.z[row("clock_skew.currents")]), starts)
         out = axis.simulate(model, drive, *record, step, pack.dT, pack.slide, self.between)
         out[0] -= zero
         return out[[_KERNEL_ROW[name] for name in pack.bench.roles.outputs]]

@@ -34,7 +34,7 @@ class Window:
 
     `outputs` has one row per output channel of its record. `position`, `speed` are smooth; `static` windows hold
     samples at rest with the `direction` of approach. `before` is time and position as recorded, from the last gap
-    (whose number is `chain`) up to the first sample.
+    (whose number is `chain`) up to the first sample. `course` is time and drive of the whole cycle.
     """
 
     group: str
@@ -49,6 +49,7 @@ class Window:
     direction: Array | None = None
     stretch: int = 0
     before: tuple[Array, Array] = (np.empty(0), np.empty(0))
+    course: tuple[Array, Array] = (np.empty(0), np.empty(0))
     chain: int = 0
 
     @property
@@ -146,10 +147,9 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
                 columns = (t[rows], cycle[who.drive][rows], outputs, smooth[rows], speed[rows])
                 gap = max(gap for gap in (0, *gaps.tolist()) if gap <= part[0])
                 before = (t[gap : part[0] + 1], raw[gap : part[0] + 1])
+                course, chain = (t, cycle[who.drive]), cycle.number * 1_000_000 + gap
                 out.append(
-                    Window(
-                        group, label, *columns, dT, stretch=stretch, before=before, chain=cycle.number * 1_000_000 + gap
-                    )
+                    Window(group, label, *columns, dT, stretch=stretch, before=before, course=course, chain=chain)
                 )
     return out
 
