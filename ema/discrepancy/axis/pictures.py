@@ -9,6 +9,7 @@ from ema.core.names import CHANNELS
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Point
 from ema.discrepancy.report import Picture, picture
+from ema.models.axis_config import LinearAxis
 
 from .cogging import integer_orders, thinned
 from .plant import AxisPlant
@@ -71,11 +72,15 @@ def _torque(plant: AxisPlant, before: Point, after: Point) -> Picture:
                 size.append(float(np.hypot(c[0], c[1])))
             left.plot(orders, size, colour, lw=1, label=label)
         right.plot(weak.integrate(m.w), weak.y, colour, ls="", marker=".", ms=1, label=label)
-    left.set_xlabel("order [1/turn]")
-    left.set_ylabel("torque residual, amplitude")
-    right.set_xlabel("speed")
-    right.set_ylabel("torque residual")
+    linear = isinstance(plant.plant, LinearAxis)
+    residual = "force residual [N]" if linear else "torque residual [N m]"
+    left.set_xlabel("spatial frequency [rad/m]" if linear else "order [1/turn]")
+    left.set_ylabel(f"{residual}, amplitude")
+    right.set_xlabel("speed [m/s]" if linear else "speed [rad/s]")
+    right.set_ylabel(residual)
     right.legend(fontsize="small", markerscale=6)
     return picture(
-        "What the model lacks", "Torque that the model cannot account for, along the measured motion.", figure
+        "What the model lacks",
+        f"{'Force' if linear else 'Torque'} that the model cannot account for, along the measured motion.",
+        figure,
     )

@@ -172,7 +172,9 @@ def _moving(plant: AxisPlant, model: axis.Model, j: int, offset: int, zero: floa
     raw_w = w.speed if speed_row is None else w.outputs[speed_row]
     speed = np.interp(w.t + late[1], w.t, w.speed)
     raw_w = np.interp(w.t + late[1], w.t, raw_w)
-    drive = (w.drive - z[row("drive_offset.offset")]) / (1.0 + z[row("drive_gain.gain")])
+    drive = (w.drive_by(z[row("clock_skew.currents")]) - z[row("drive_offset.offset")]) / (
+        1.0 + z[row("drive_gain.gain")]
+    )
     i, k_t = _current(b, w, drive, speed, z)
     dT = np.full(w.n, w.dT)
     known = axis.torque_along(model, theta + zero, speed, i, w.t, dT, force=b.roles.kind == "force")
