@@ -148,15 +148,6 @@ def examined(hidden, plant, bench, **flaws):
     return examine(plant, measured(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])).findings
 
 
-def test_currents_with_a_clock_of_their_own_are_seen_by_it(hidden, shipped_plant):
-    findings = examined(hidden, shipped_plant, hidden.BENCH, current_skew=5e-4, current_late=-2e-4, k1=0.03)
-    assert [e.name for e in findings.effects] == ["clock_skew"]
-    found = findings.effects[0].parameters
-    assert found["currents"].low <= 5e-4 <= found["currents"].high
-    assert found["late"].low <= -2e-4 <= found["late"].high
-    assert findings.gain.k_after[0] == pytest.approx(0.03, abs=2e-3)
-
-
 @pytest.mark.parametrize(("k2", "noise"), [(0.0, 4e-6), (0.2, 4e-6), (0.0, 4e-5)])
 @pytest.mark.parametrize("zero", [7.5e-6, -1e-4])
 def test_zeros_of_rotor_and_user_are_told_apart_in_the_middle_of_the_play(hidden, shipped_plant, zero, k2, noise):

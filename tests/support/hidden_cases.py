@@ -133,13 +133,6 @@ CASES: dict[str, Case] = {
     "resolver_error": Case(_several(0.01, "once_cosine", "once_sine", "twice_cosine", "twice_sine"),
                            ("resolver_error",)),
     "clock_skew": Case(_one("clock_skew", 1e-4, 1e-3, signed=True), ("clock_skew",)),
-    "clock_skew of the currents": Case(
-        _both(_one("current_skew", 1e-4, 1e-3, signed=True), _one("current_late", 5e-5, 5e-4, signed=True)),
-        ("clock_skew",),
-        parameters={
-            "clock_skew.currents": lambda f: f["current_skew"], "clock_skew.late": lambda f: f["current_late"],
-        },
-    ),
     "adc_saturation": Case(_one("adc_limit", 4.0, 6.0), ("adc_saturation",),
                            parameters={"adc_saturation.limit": lambda f: f["adc_limit"]}),
     "winding_resistance": Case(_one("resistance", 0.1, 0.4), ("winding_resistance",)),

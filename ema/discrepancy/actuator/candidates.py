@@ -231,7 +231,6 @@ def candidates(
         _plain("asymmetric_friction", "asymmetry"),
         _plain("clock_skew", "rate", step={"rate": 1e-4}),
         _plain("clock_skew", "shared", step={"shared": 5e-4}),
-        _plain("clock_skew", "currents", "late"),
         _commutation(plant, data.zero),
         _plain("comparator_delay", "time"),
         _plain("constant_load", "torque"),
