@@ -111,9 +111,9 @@ class _Objective:
         self.plant, self.free, self.start, self.blocks, self.frozen = plant, free, start, blocks, frozen
         self.low, self.high = np.array([f.low for f in free]), np.array([f.high for f in free])
         self.scales = np.array([f.scale for f in free])
-        known = [(j, f.start, f.prior) for j, f in enumerate(free) if f.prior is not None]
+        known = [(j, f.prior) for j, f in enumerate(free) if f.prior is not None]
         self.prior_slopes = np.zeros((len(known), len(free)))
-        for row, (j, _, sd) in enumerate(known):
+        for row, (j, sd) in enumerate(known):
             self.prior_slopes[row, j] = 1.0 / sd
         self.prior_centre = np.array([f.start for f in free])
         self.x0 = np.clip(np.array([start[f.name] for f in free]), self.low, self.high)

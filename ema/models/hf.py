@@ -23,7 +23,7 @@ from .layout import ENERGIES, N_ROWS, N_STATE, row
 
 N_LANES = 16
 DT = 1e-6  # [s]
-N_BEYOND = 32
+N_BEYOND = 32  # samples after the end are simulated in steps of so many
 N_RING = 64  # control ticks remembered for delays at least
 
 __all__ = ["DT", "N_LANES", "Effects", "Response", "cold_start", "parameters", "simulate", "start_at"]
@@ -174,7 +174,7 @@ def simulate(
 def _beyond(clocks: np.ndarray, T: float, n_recorded: int) -> np.ndarray:
     """Samples that a slow recorder takes after the end, in steps of `N_BEYOND` so that like runs share a batch."""
     rate, currents, late = clocks.T
-    last = np.maximum((rate * n_recorded), (rate + currents) * n_recorded + late / T)
+    last = np.maximum(rate * n_recorded, (rate + currents) * n_recorded + late / T)
     return N_BEYOND * np.ceil(np.maximum(last, 0.0) / N_BEYOND).astype(int)
 
 

@@ -74,8 +74,6 @@ class Flaws(NamedTuple):
     position_delay: float = 0.0  # [s]
     speed_delay: float = 0.0  # [s]
     clock_skew: float = 0.0  # the recorder's interval is longer by this share
-    current_skew: float = 0.0  # that of the currents alone
-    current_late: float = 0.0  # [s] the currents are sampled after the other channels
     adc_limit: float = 30.0  # [A]
     # outside the library
     cushion: float = 0.0  # [N m/rad² at the user] a spring that stiffens from cushion_begin on
@@ -171,7 +169,6 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
     I_ref, last_error = 0.0, 0.0
     wishes, at = np.zeros((64, 3)), 0
     draw, deaf = 0, -1
-    own_clock, sampled = f.current_skew != 0.0 or f.current_late != 0.0, 0
     for tick in range(n):
         theta, w, theta_u, w_u = mech[0], mech[1], mech[2], mech[3]
         error = (
@@ -200,18 +197,13 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
             wanted = min(max(wanted, I_ref - f.slew * T), I_ref + f.slew * T)
         I_ref = wanted
         for j in range(3):
-            if not own_clock:
-                out[j, tick] = flt[1, j]
+            out[j, tick] = flt[1, j]
         out[3, tick], out[4, tick], out[5, tick] = theta + error, seen_u, link[0]
         if tick == n - 1:
             break
         for sub in range(substeps):
             theta, w, theta_u, w_u = mech[0], mech[1], mech[2], mech[3]
             now = t0 + tick * T + sub * dt
-            while own_clock and sampled < n and now - t0 >= sampled * T * (1.0 + f.current_skew) + f.current_late:
-                for j in range(3):
-                    out[j, sampled] = flt[1, j]
-                sampled += 1
             # the motor
             seen = (
                 p
@@ -325,13 +317,11 @@ def cycle(flaws: Flaws, command: np.ndarray, state: State, seed: int, bench: Ben
     """One recorded cycle at 10 kHz; `state` is advanced. Channels by name."""
     rng = np.random.default_rng(seed)
     n, late = len(command), bench.command_late
+    out = np.zeros((6, n + late))
     flaws = Flaws(*(float(x) for x in flaws))
-    beyond = math.ceil(max(flaws.current_skew * n + flaws.current_late / TICK, 0.0))  # what slow currents see later
-    beyond += 1 if beyond else 0
-    out = np.zeros((6, n + late + beyond))
-    acted = np.append(np.asarray(command, dtype=float), np.repeat(command[-1], late + beyond))
+    acted = np.append(np.asarray(command, dtype=float), np.repeat(command[-1], late))
     _run(
-        *(flaws, acted, bench.lvdt_noise * rng.standard_normal(n + late + beyond)),
+        *(flaws, acted, bench.lvdt_noise * rng.standard_normal(n + late)),
         *(
             bench.substeps,
             10.0 * rng.random(),
@@ -344,7 +334,7 @@ def cycle(flaws: Flaws, command: np.ndarray, state: State, seed: int, bench: Ben
             out,
         ),
     )
-    out = np.ascontiguousarray(out[:, late : late + n])
+    out = np.ascontiguousarray(out[:, late:])
     i = np.clip(out[:3] + bench.current_noise * rng.standard_normal((3, n)), -flaws.adc_limit, flaws.adc_limit)
     step = 60.0 / 4096
     i = step * np.round(i / step)

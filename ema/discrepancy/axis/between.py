@@ -10,6 +10,8 @@ lighter by half a sample in the loop's time constant; where the record does not 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ema.discrepancy.examine import examine
@@ -82,11 +84,14 @@ def _alike(one: Outcome, other: Outcome) -> bool:
 
 def _widen(outcome: Outcome, other: Outcome) -> None:
     """Let the intervals of an outcome hold those of another one with the same effects."""
-    theirs = {e["name"]: e["parameters"] for e in other.effects}
-    for effect in outcome.effects:
-        for name, own in effect["parameters"].items():
-            if (there := theirs[effect["name"]].get(name)) is not None:
-                own["low"], own["high"] = min(own["low"], there["low"]), max(own["high"], there["high"])
+    for effect, same in zip(_sorted(outcome.effects), _sorted(other.effects), strict=True):
+        for own, there in zip(effect["parameters"].values(), same["parameters"].values(), strict=True):
+            own["low"], own["high"] = min(own["low"], there["low"]), max(own["high"], there["high"])
+
+
+def _sorted(effects: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """By name; of cogging there may be several lines."""
+    return sorted(effects, key=lambda e: (e["name"], e["parameters"].get("order", {"value": 0.0})["value"]))
 
 
 def _of_plain(plant: AxisPlant) -> str:
