@@ -315,7 +315,7 @@ def _effects(plant: Plant, state: _State, trust: dict[str, float], point: Any, d
 
 def _leans(fitted: Fit, candidate: Candidate) -> bool:
     """Whether a law leans on its bounds: then it is not the one that is missing."""
-    return any(_at_bound(f, fitted.point[f.name]) for f in candidate.free)
+    return any(_at_bound(f, fitted.point[f.name]) for f in candidate.free if not f.is_shape)
 
 
 def _at_bound(free: Free, value: float) -> bool:

@@ -18,7 +18,8 @@ class Free:
     """A parameter to be fitted.
 
     `scale` is a change that matters (it conditions the search); `step` the change for a finite difference, above the
-    simulation's own roughness; `prior` the standard deviation about `start` that is known beforehand, if any.
+    simulation's own roughness; `prior` the standard deviation about `start` that is known beforehand, if any. A
+    `is_shape` goes from one law to another: its ends are these laws, not the ends of what is credible.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Free:
     scale: float
     step: float = 0.0
     prior: float | None = None
+    is_shape: bool = False
 
     @property
     def difference(self) -> float:

@@ -17,7 +17,7 @@ import math
 
 from numba import njit
 
-from ema.effects import cogging, supply_sag, torque_term
+from ema.effects import cogging, inverter_drop, supply_sag, torque_term
 from ema.effects.dry_friction import rubbing_speed_after, speed_after
 
 from . import jit  # noqa: F401  (sets the cache folder before anything is compiled)
@@ -45,7 +45,8 @@ position_error = combined("position_error", "axis", row)
 J, C, F_S, F_D, K_T, K_E, R, L = (row(name) for name in ("J", "C", "F_s", "F_d", "k_t", "k_e", "R", "L"))
 K_W, I_MAX, DT = row("K_w"), row("I_max"), row("dT")
 INERTIA, GAIN, OFFSET = row("inertia.change"), row("drive_gain.gain"), row("drive_offset.offset")
-DROP, SKEW = row("inverter_drop.voltage"), row("clock_skew.rate")
+DROP, BELOW, ROUNDNESS = (row(f"inverter_drop.{name}") for name in ("voltage", "below", "roundness"))
+SKEW = row("clock_skew.rate")
 POSITION_DELAY, SPEED_DELAY = row("position_delay.time"), row("speed_delay.time")
 COGGING = row("cogging.amplitude")
 COMPLIANCE, J_LOAD, ZETA, LOAD_DRAG, LOAD_FRICTION = (
@@ -99,6 +100,12 @@ def current_after(i, e, R, L, h):
     """Current a time `h` later under a constant voltage, exactly.    L di/dt = e - R i   [A]"""
     x = h * R / L
     return e / R + (i - e / R) * math.exp(-x) if x > 1e-6 else i + h / L * e
+
+
+@njit(inline="always")
+def lost(z, i):
+    """Voltage the inverter loses.   [V]"""
+    return inverter_drop.drop(i, z[DROP], z[BELOW], z[ROUNDNESS])
 
 
 @njit(inline="always")
@@ -216,7 +223,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
                     L_now = max(z[L] * inductance_factor(z, 0, 1, i), 1e-12)
                     if z[SAG] > 0.0:
                         u = _applied(u, i, z[SAG], z[V_DC])
-                    e = u - k_e * (w + 0.5 * dw) - z[DROP] * min(max(i / 1e-2, -1.0), 1.0)
+                    e = u - k_e * (w + 0.5 * dw) - lost(z, i)
                     i_next = current_after(i, e, R_now, L_now, h)
                     i, i_end = 0.5 * (i + i_next), i_next
                 else:
@@ -257,8 +264,7 @@ def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
         a, b = max(k - 1, 0), min(k + 1, n - 1)
         di = (out[2, b] - out[2, a]) / ((t[b] - t[a]) * skew) if b > a else 0.0
         k_e = z[K_E] * emf_factor(z, 0, 1, i, z[DT])
-        drop = z[DROP] * min(max(i / 1e-2, -1.0), 1.0)
-        u = R_now * i + z[L] * inductance_factor(z, 0, 1, i) * di + k_e * out[1, k] + drop
+        u = R_now * i + z[L] * inductance_factor(z, 0, 1, i) * di + k_e * out[1, k] + lost(z, i)
         out[3, k] = _commanded(u, i, z[SAG], z[V_DC]) if z[SAG] > 0.0 else u
     for k in range(n - 1, -1, -1):  # backwards, since the undelayed values of earlier samples are still needed
         w0 = out[1, 0]

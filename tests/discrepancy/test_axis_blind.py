@@ -46,6 +46,19 @@ def test_more_friction_is_fitted_and_not_called_an_effect(axis_bench, hidden_axi
     assert outcome.k_after[0] == pytest.approx(bench.F_d, rel=0.01)
 
 
+@pytest.mark.parametrize("shape", [np.tanh, lambda x: np.clip(x, -1.0, 1.0)], ids=["rounded", "straight"])
+def test_drop_that_fades_at_small_currents_brings_no_second_cause(axis_bench, hidden_axis, shape):
+    """With a hard drop it had been a smaller one with, perhaps, a change of resistance."""
+    bench, plant_file, motions = hidden_axis.drawn(2)
+    bench.voltage = lambda u, i: u + 0.15 * shape(i / 0.12)
+    record = axis_bench.record(bench, np.random.default_rng(2), motions=motions)
+    (drop,) = examined(AxisPlant(RotaryAxis.model_validate(plant_file), [record])).effects
+    assert drop["name"] == "inverter_drop"
+    assert drop["indistinguishable_from"] == []
+    assert drop["parameters"]["voltage"]["low"] <= 0.15 <= drop["parameters"]["voltage"]["high"]
+    assert drop["parameters"]["below"]["low"] <= 0.12 <= drop["parameters"]["below"]["high"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "parameter", "tolerance"),

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .plant import AxisPlant
 
 PRIOR = 0.5  # standard deviation of a fitted parameter about the plant file's value, relative
+SHAPES = ("roundness",)  # of a law
 BASE_RANGE = 20.0  # a fitted parameter stays within this factor of the plant file's value
 
 
@@ -113,7 +114,7 @@ def _candidate(plant: AxisPlant, s: Sizes, name: str, point: Point) -> Candidate
     units = {p.name: p.unit for p in registry()[name].parameters}
     nominal = {**registry()[name].neutral(), **plant.plant.effects.get(name, {})}
     free = tuple(
-        Free(f"{name}.{parameter}", units[parameter], low, high, start[0], scale)
+        Free(f"{name}.{parameter}", units[parameter], low, high, start[0], scale, is_shape=parameter in SHAPES)
         for parameter, (low, high, start, scale) in spec.items()
     )
     grid: list[dict[str, float]] = [{}]
@@ -184,7 +185,11 @@ def _resistance(plant: AxisPlant, s: Sizes) -> _Spec | None:
 def _drop(plant: AxisPlant, s: Sizes) -> _Spec | None:
     if not (_has(plant, "u_q") or plant.plant.drive == "voltage"):
         return None
-    return {"voltage": (0.0, 0.5 * s.voltage, (0.02 * s.voltage,), 0.01 * s.voltage)}
+    return {
+        "voltage": (0.0, 0.5 * s.voltage, (0.02 * s.voltage,), 0.01 * s.voltage),
+        "below": (0.0, s.current, (0.01 * s.current, 0.2 * s.current), 0.05 * s.current),
+        "roundness": (0.0, 1.0, (0.5,), 0.5),
+    }
 
 
 def _sag(plant: AxisPlant, s: Sizes) -> _Spec | None:
