@@ -20,7 +20,9 @@ from ema.discrepancy.actuator.fit import K_FREE
 from ema.discrepancy.actuator.forward import exchanged
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.select import Search
+from ema.discrepancy.actuator.screening import promising
+from ema.discrepancy.actuator.search import Search
+from ema.discrepancy.actuator.select import extend
 from ema.models.actuator import Actuator
 
 
@@ -196,7 +198,7 @@ def test_what_is_alike_only_beside_what_is_found_is_a_rival(hidden, shipped_plan
     search = Search(plant, Noise(plant, start), *split(data))
     inertia = next(c for c in candidates(shipped_plant, data, []) if c.effect == "inertia")
     found = search.model((inertia,), (*K_FREE, *inertia.frees), start, None, 1)
-    near = {m.names[-1] for m in search.extend(found, search.promising(found)) if m.heldout < 2.0}
+    near = {m.names[-1] for m in extend(search, found, promising(search, found)) if m.heldout < 2.0}
     assert {"constant_load", "asymmetric_friction"} <= near
 
 
@@ -217,7 +219,7 @@ def test_a_heavier_rotor_beside_drag_is_no_weaker_magnet_for_sure(hidden, shippe
     search = Search(plant, Noise(plant, start), *split(data))
     drag = next(c for c in candidates(shipped_plant, data, []) if c.effect == "viscous_drag")
     found = search.model((drag,), (*K_FREE, *drag.frees), start, None, 1)
-    beside = {m.names[-1]: m for m in search.extend(found, search.promising(found))}
+    beside = {m.names[-1]: m for m in extend(search, found, promising(search, found))}
     assert beside["inertia"].heldout < found.heldout
     assert beside["inertia"].fit.point["viscous_drag.coefficient"] == pytest.approx(7.37e-5, rel=0.02)
     assert beside["inertia"].fit.point["k1"] == pytest.approx(0.057, abs=3e-3)

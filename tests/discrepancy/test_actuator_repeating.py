@@ -10,7 +10,7 @@ from ema.discrepancy.actuator.examine import split
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.repeating import repeating, said
-from ema.discrepancy.actuator.select import Search
+from ema.discrepancy.actuator.search import Search
 
 
 @pytest.mark.parametrize(

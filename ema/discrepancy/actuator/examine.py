@@ -19,7 +19,7 @@ from .noise import Noise, Verdict
 from .paths import faults_only, gone_on, resume, shortest, with_faults
 from .plant import EmaPlant
 from .play import as_held, with_friction
-from .select import Model, Search
+from .search import Model, Search
 from .simpler import (
     simpler,
     still_alike,

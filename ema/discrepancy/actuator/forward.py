@@ -6,10 +6,13 @@ from collections.abc import Sequence
 
 from .comparators import PLAIN
 from .noise import Noise, Verdict
-from .select import CHANCE, FAR, MAX_EFFECTS, NEARLY_ALL, Model, Search
+from .screening import promising
+from .search import CHANCE, FAR, Model, Search
+from .select import NEARLY_ALL, extend
 from .verdicts import NEARLY, as_on_the_bench, at_the_minimum, surely
 from .weighing import SLACK, WORTH_IT, does_it, is_alike, is_credible, is_enough, may_be_nothing
 
+MAX_EFFECTS = 3
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
 NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
 CLOSE = 0.5  # share of what was left, from which another turn is not worth it
@@ -25,12 +28,12 @@ def grown(
     left = after.excess
     while not v.is_noise and len(set(after.names) - {"torque_line"}) < MAX_EFFECTS:  # a second line is no further cause
         enough = is_enough(after, before)
-        screened = search.promising(after)
-        models = search.extend(after, screened)
+        screened = promising(search, after)
+        models = extend(search, after, screened)
         needed = max(STRONG * after.excess, CHANCE) if enough else WORTH_IT * after.excess
         real = _real(search, models, after, needed)
         if not real and needed <= after.excess < FAR:
-            real = _real(search, search.extend(after, screened, models), after, needed)
+            real = _real(search, extend(search, after, screened, models), after, needed)
         if not real and enough:
             real = _leaving_noise(search, models, after)
         if not real:

@@ -22,7 +22,7 @@ from .features import Array
 from .fit import K_FREE, N_SEEDS, Columns, Fit, Free, fit, free, residuals, stacked_jacobian
 from .noise import scatter
 from .plant import Point
-from .select import Model, Search
+from .search import Model, Search
 
 DIFFER = 1.5  # times what noise makes of the differences between cycles of one motion
 TOLD = 0.01  # range of a fault from which it is said to change

@@ -11,7 +11,7 @@ from .features import Array
 from .forward import CLOSE, exchanged, grown
 from .noise import Noise, Verdict
 from .plant import EmaPlant, Point
-from .select import CHANCE, Model, Search, start_model
+from .search import CHANCE, Model, Search, start_model
 from .simpler import simpler
 from .telling import FAULT_ALARM
 from .timing import samples_late

@@ -8,7 +8,7 @@ import numpy as np
 
 from .fit import residuals
 from .plant import Point
-from .select import FINAL_SEED, N_FINAL, Search
+from .search import FINAL_SEED, N_FINAL, Search
 
 SELDOM = 0.8  # share that repeats, below which that is worth a sentence; what always acts alike has 0.98 and more
 FEWEST = 2.0  # misfit from which chance does not decide it

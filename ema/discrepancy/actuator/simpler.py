@@ -9,8 +9,9 @@ from ema.effects import registry
 
 from .candidates import Candidate, resolver_zero
 from .forward import SAME
+from .in_place import instead_of_faults, what_does_it_too, without_common_faults
 from .noise import Noise, Verdict
-from .select import CHANCE, Model, Search
+from .search import CHANCE, Model, Search
 from .verdicts import NEARLY
 from .weighing import ALIKE, DOUBTFUL, is_alike, is_credible, is_enough, may_be_nothing
 
@@ -27,7 +28,7 @@ def with_fewer_faults(
     if not _leaves_little(model, v, before):
         return model, v
     for place, effect in enumerate(model.effects):
-        m = search.without_common_faults(model, effect)
+        m = without_common_faults(search, model, effect)
         if m is None or search.left_more(m, model, (search.noise,)) > SAME:
             continue
         w = search.verdict(m)
@@ -67,7 +68,7 @@ def simpler(
         return model, v
     as_good = []
     here = search.noise
-    for m in search.instead_of_faults(model):
+    for m in instead_of_faults(search, model):
         if m.heldout > model.heldout + NEARLY:
             continue
         search.noise = Noise(search.plant, m.fit.point)
@@ -84,7 +85,7 @@ def simpler(
         return model, v
     least, m, w, search.noise = min(as_good, key=lambda found: found[0])
     rivals = dict.fromkeys(n.names[-1] for more, n, *_ in as_good if more - least < ALIKE * m.excess + CHANCE)
-    for n in search.alike(model, m, set(rivals)):
+    for n in what_does_it_too(search, model, m, set(rivals)):
         if search.left_more(n, m, (search.noise,)) < ALIKE * m.excess + CHANCE and is_credible(n):
             rivals[n.names[-1]] = None
     alike.append((_in_common(m, m.effects[-1]), *(name for name in rivals if name != m.names[-1])))

@@ -18,7 +18,7 @@ from .extension import as_extension
 from .fit import Fit
 from .noise import Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
-from .select import CHANCE, FINAL_SEED, K_SEEN, N_FINAL, Model, Search
+from .search import CHANCE, FINAL_SEED, K_SEEN, N_FINAL, Model, Search
 from .structure import structure
 from .weighing import WORTH_IT, is_enough
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from .comparators import CLEAR, PLAIN, find_step, take_step
 from .noise import N_RUNS_SURE, Noise, Verdict
-from .select import CHANCE, Model, Search
+from .search import CHANCE, Model, Search
 from .timing import samples_late
 from .weighing import DISTANT
 

@@ -6,7 +6,7 @@ from ema.effects import registry
 from ema.effects.base import ABSENT
 
 from .candidates import Candidate
-from .select import CHANCE, Model, Search
+from .search import CHANCE, Model, Search
 
 WORTH_IT = 0.25  # share of what is left that a further effect must take on held-out cycles
 ENOUGH = 0.05  # share of what faults alone leave, from which effects explain it but for the form of their laws

@@ -78,7 +78,7 @@ def _doubted(plant: AxisPlant, outcome: Outcome) -> str:
 def _alike(one: Outcome, other: Outcome) -> bool:
     """Whether two outcomes name the same effects and leave nearly the same."""
     rests = sorted(max(r.rms_after for r in o.records) for o in (one, other))
-    names = [sorted(e["name"] for e in o.effects) for o in (one, other)]
+    names = [sorted((e["name"], *e["parameters"]) for e in o.effects) for o in (one, other)]
     return names[0] == names[1] and rests[1] < ALIKE * rests[0]
 
 

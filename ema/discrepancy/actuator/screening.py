@@ -1,0 +1,134 @@
+"""What candidates promise beside a model: to first order from probes, or simulated where that says little."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ema.core.names import FAULTS
+
+from .candidates import Candidate, candidates
+from .features import Array
+from .fit import SEED, Free, bounded, bounds, moved, residuals, stacked_jacobian
+from .plant import Point
+from .search import N_GLANCE, Model, Search
+
+N_PROBE, N_PROBE_HIDDEN = 8, 24  # seeds of a column that only screens; of one that is hardly felt
+WIDER = 3.0  # times the step of an effect that is hardly felt
+FELT = 0.5  # cosine between halves of the seeds, below which a column is mostly noise
+DT_PROBE = 2e-6  # [s] step of a simulation that only screens: its columns are within 4 % (12 % for dead time)
+AT_LEAST = 0.01  # share of the whole squared residual that it must promise
+
+
+class Screened(NamedTuple):
+    """A candidate's promise: squared residual on training cycles to first order, and where to begin a fit."""
+
+    promised: float
+    candidate: Candidate
+    start: Point
+
+
+def promising(search: Search, model: Model) -> list[Screened]:
+    """All that may stand beside the effects of `model`, by what it promises to first order."""
+    line = "torque_line" if "cogging" in model.names else "cogging"
+    found = candidates(search.plant.plant, search.plant.data, search.torques(model), line, search.plant.resonance)
+    return _screened(search, model, [c for c in found if c.effect not in model.names])
+
+
+def _screened(search: Search, model: Model, found: Sequence[Candidate]) -> list[Screened]:
+    """What each candidate promises to first order next to all that `model` has free, best first."""
+    found = probed(search, found)
+    f = model.fit
+    own = stacked_jacobian(search.noise, f.free, f.columns, search.train)
+    r = np.concatenate([f.residuals[c] for c in search.train])
+    low, high = bounds(f.free, f.point)
+    ranked = []
+    for c in found:
+        J = columns_of(search, c)
+        c_low, c_high = c.limits()
+        step, promised = bounded(
+            np.concatenate([own, J], axis=1), r, np.concatenate([low, c_low]), np.concatenate([high, c_high])
+        )
+        start = {**moved(f.point, f.free, step[: len(f.free)]), **c.start(step[len(f.free) :])}
+        ranked.append(Screened(promised, c, start))
+    ranked = [s for s in ranked if not any(_does_as_well(t, s, AT_LEAST * float(r @ r)) for t in ranked)]
+    return sorted(ranked, key=lambda entry: entry.promised)
+
+
+def probed(search: Search, found: Sequence[Candidate]) -> list[Candidate]:
+    """Fill in the columns (per unit) of what was not probed before; what is hardly felt comes with longer steps."""
+    new = [c for c in found if c.key not in search.probed]
+    hidden = _probe(search, new, N_PROBE)
+    _probe(search, [c.wider(WIDER) for c in new if c.key in hidden], N_PROBE_HIDDEN)
+    return [search.probed[c.key] for c in found]
+
+
+def _probe(search: Search, found: Sequence[Candidate], n_seeds: int) -> set[str]:
+    """Simulate probes; keys of candidates whose columns are mostly noise, as two halves of the seeds tell."""
+    if not found:
+        return set()
+    first = search.plant.first
+    points = [{}, *(p for c in found for p in c.probes())]
+    here, *there = search.plant.repeated(points, first, n_seeds, SEED, (DT_PROBE,))
+    probed, hidden = iter(there), set()
+    for c in found:
+        search.probed[c.key] = c
+        for j, amount in enumerate(c.amounts):
+            runs = next(probed)
+            halves = []
+            for motion, cycle in enumerate(first):
+                column = (runs[cycle].features - here[cycle].features) / amount
+                search.columns[motion, c.probe_name(j)] = column.mean(axis=0)
+                white = search.noise.motions[motion].white(column)
+                halves.append([white[half::2].mean(axis=0) for half in (0, 1)])
+            a, b = np.concatenate(halves, axis=1)
+            if a @ b < FELT * np.linalg.norm(a) * np.linalg.norm(b):
+                hidden.add(c.key)
+    return hidden
+
+
+def start_with(search: Search, model: Model, c: Candidate, faults: Point) -> Point:
+    """A start with some faults of `model` at other values, where the effect stands for what that takes away."""
+    return _starts_with(search, model, [c], faults)[0]
+
+
+def _starts_with(search: Search, model: Model, found: Sequence[Candidate], faults: Point) -> list[Point]:
+    point = {**model.fit.point, **faults}
+    left = residuals(search.plant, search.noise, point, search.train, N_GLANCE)
+    r = np.concatenate([left[cycle] for cycle in search.train])
+    return [{**point, **c.start(bounded(columns_of(search, c), r, *c.limits())[0])} for c in found]
+
+
+def simulated(search: Search, model: Model, screened: Sequence[Screened]) -> list[Screened]:
+    """Candidates by what their starts leave when simulated: far from the data first order promises little."""
+    motions = search.plant.data.motion
+    cycles = [next(c for c in search.train if motions[c] == m) for m in sorted({int(motions[c]) for c in search.train})]
+    none = dict.fromkeys(FAULTS, 0.0)
+    alone = _starts_with(search, model, [s.candidate for s in screened], none)
+    starts = [
+        [s.start, other, *({**model.fit.point, **none, **size} for size in s.candidate.sizes())]
+        for s, other in zip(screened, alone, strict=True)
+    ]
+    points = [point for of in starts for point in of]
+    here, *there = search.costs([model.fit.point, *points], cycles, typical=True, steps=(DT_PROBE,))
+    cost = sum(float(r @ r) for r in model.fit.residuals.values())
+    costs = iter(there)
+    ranked = []
+    for s, of in zip(screened, starts, strict=True):
+        least, best = min((next(costs), at) for at in range(len(of)))
+        ranked.append(Screened(cost * least / here, s.candidate, of[best]))
+    return sorted(ranked, key=lambda entry: entry.promised)
+
+
+def columns_of(search: Search, c: Candidate) -> Array:
+    """Whitened columns (per unit) of a probed candidate where nothing else acts."""
+    names = [Free(c.probe_name(j), 0.0, 0.0, 1.0) for j in range(len(c.amounts))]
+    return stacked_jacobian(search.noise, names, search.columns, search.train)
+
+
+def _does_as_well(simpler: Screened, s: Screened, hardly: float) -> bool:
+    """Whether the same effect with fewer parameters promises hardly less."""
+    fewer = len(simpler.candidate.linear) < len(s.candidate.linear)
+    return simpler.candidate.effect == s.candidate.effect and fewer and simpler.promised < s.promised + hardly

@@ -1,0 +1,189 @@
+"""The state of a search for effects, and what can be asked of a model: fitted, judged, compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .candidates import Candidate
+from .features import Array
+from .fit import K_FREE, N_SEEDS, SEED, Columns, Fit, Free, columns, fit, residuals, residuals_at, with_short_steps
+from .flat import settled
+from .noise import Noise, Verdict, verdict
+from .plant import EmaPlant, Point, Steps
+from .weak import Torque, torque
+
+N_FINAL = 16  # seeds of a mean that is judged
+FINAL_SEED = 3_000_000
+N_GLANCE = 4  # seeds that tell a good start from a bad one
+K_SEEN = 0.01  # a fault that is there
+CHANCE = 0.03  # difference in misfit that seeds make
+FAR = 100.0  # excess from which candidates are simulated before they are ranked
+
+Say = Callable[[str], None]
+
+
+@dataclass
+class Model:
+    """A fitted model and how it does on held-out cycles.
+
+    `heldout` is the sum of squares over what noise makes of it: one where nothing is left to explain.
+    """
+
+    effects: tuple[Candidate, ...]
+    fit: Fit
+    heldout: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(c.effect for c in self.effects)
+
+    @property
+    def excess(self) -> float:
+        """What is left on held-out cycles beyond noise."""
+        return max(self.heldout - 1.0, 0.0)
+
+    def shows_faults_of(self, effect: Candidate) -> bool:
+        """Whether all of the several faults that an effect can be mistaken for are seen."""
+        faults = effect.faults
+        return len(faults) > 1 and all(self.fit.point.get(name, 0.0) > K_SEEN for name in faults)
+
+
+@dataclass
+class Search:
+    """The state of a search: everything that was tried, in order."""
+
+    plant: EmaPlant
+    noise: Noise
+    train: list[int]
+    heldout: list[int]
+    say: Say = lambda text: None
+    columns: dict[tuple[int, str], Array] = field(default_factory=dict)
+    probed: dict[str, Candidate] = field(default_factory=dict)
+    tried: list[Model] = field(default_factory=list)
+
+    def model(
+        self,
+        effects: Sequence[Candidate],
+        frees: Sequence[Free],
+        start: Point,
+        known: Columns | None,
+        n_iterations: int,
+    ) -> Model:
+        """Fit on training cycles, judge on held-out ones."""
+        fitted = fit(self.plant, self.noise, frees, start, self.train, known=known, n_iterations=n_iterations)
+        return self._judged(effects, fitted)
+
+    def settled(self, model: Model) -> Model:
+        """`model` at its minimum, along what the record hardly feels too."""
+        fitted = settled(self.plant, self.noise, model.fit, self.train)
+        if fitted is model.fit:
+            fitted = with_short_steps(self.plant, self.noise, model.fit, self.train)
+        return self._judged(model.effects, fitted)
+
+    def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:
+        made = Model(tuple(effects), fitted, self._misfit(self.noise, fitted.point, self.heldout))
+        self.tried.append(made)
+        self.say(f"{' + '.join(made.names) or 'faults only'}: held-out misfit {made.heldout:.3g}")
+        return made
+
+    def excess_by(self, noise: Noise, model: Model) -> float:
+        """What `model` leaves on held-out cycles beyond another noise."""
+        return max(self._misfit(noise, model.fit.point, self.heldout) - 1.0, 0.0)
+
+    def _misfit(self, noise: Noise, point: Point, cycles: Sequence[int]) -> float:
+        left = residuals(self.plant, noise, point, cycles, N_FINAL, FINAL_SEED)
+        return noise.misfit(list(left.values()), cycles)
+
+    def verdict(self, model: Model) -> Verdict:
+        """Is what `model` leaves on all cycles noise?"""
+        cycles = sorted(self.train + self.heldout)
+        left = residuals(self.plant, self.noise, model.fit.point, cycles, N_FINAL, FINAL_SEED)
+        frees, motions = model.fit.free, range(self.plant.n_motions)
+        only_heldout = [m for m in motions if any((m, f.name) not in model.fit.columns for f in frees)]
+        known = model.fit.columns | columns(self.plant, frees, model.fit.point, only_heldout)
+        cols = [self.noise.motions[m].white(np.array([known[m, f.name] for f in frees])).T for m in motions]
+        return verdict(self.noise, [left[c] for c in cycles], cycles, cols, 1.0 / N_FINAL)
+
+    def left_more(self, model: Model, other: Model, noises: Sequence[Noise]) -> float:
+        """How much more misfit `model` leaves of all cycles than `other`, on average over noise models."""
+        cycles, y = sorted(self.train + self.heldout), self.plant.data.y
+        means = self.plant.means([model.fit.point, other.fit.point], cycles, N_FINAL, FINAL_SEED)
+        misfits = [
+            [noise.misfit([noise.of(c).white(y[c] - at[c]) for c in cycles], cycles) for at in means]
+            for noise in noises
+        ]
+        return float(np.mean([mine - others for mine, others in misfits]))
+
+    def torques(self, model: Model) -> list[Torque]:
+        """What `model` leaves of the torque balance, by training cycle. [N m]"""
+        plant = self.plant
+        found = []
+        means = plant.means([model.fit.point], self.train, plant.n_seeds(self.train, N_SEEDS), SEED)[0]
+        for c in self.train:
+            motion = int(plant.data.motion[c])
+            at = plant.slices[motion]["torque"]
+            r = plant.data.y[c] - means[c]
+            sd = self.noise.of(c).sd
+            found.append(torque(plant.data.signals[c], r[at], sd[at], plant.plant.control.rate))
+        return found
+
+    def owed_to(self, model: Model, effect: Candidate, *, in_training: bool = False) -> float:
+        """How much misfit comes back, held-out or in training, when an effect is switched off and all else stays."""
+        neutral = {f.name: self.plant.neutral(f.name) for f in effect.frees}
+        cycles = self.train if in_training else self.heldout
+        without = self._misfit(self.noise, {**model.fit.point, **neutral}, cycles)
+        return without - (model.fit.misfit if in_training else model.heldout)
+
+    def without(self, model: Model, effect: Candidate) -> Model:
+        """The model fitted anew without one of its effects."""
+        effects, frees, point = stripped(model, effect)
+        return self.model(effects, frees, point, model.fit.columns, 3)
+
+    def instead(self, model: Model, effect: Candidate, rival: Model) -> Model:
+        """The model fitted anew with the last effect of `rival` in the place of one of its own."""
+        effects, frees, point = stripped(model, effect)
+        c = rival.effects[-1]
+        start = {name: x for name, x in rival.fit.point.items() if name.startswith(f"{c.effect}.")}
+        return self.model((*effects, c), (*frees, *c.frees), {**point, **start}, None, 4)
+
+    def better(self, starts: Sequence[Point], model: Model) -> tuple[Point, float]:
+        """The start that simulates closest to the training cycles, and its cost."""
+        costs = self.costs(starts, self.train, typical=model.excess > FAR)
+        best = int(np.argmin(costs))
+        return starts[best], costs[best]
+
+    def costs(
+        self, points: Sequence[Point], cycles: Sequence[int], *, typical: bool, steps: Steps = None
+    ) -> list[float]:
+        """Squared residual of some cycles at several points, at a glance.
+
+        The typical one is a geometric mean over cycles and groups of features: far from the data a single one, where
+        noise happens to be least, would decide what is nearer.
+        """
+        left = residuals_at(self.plant, self.noise, points, cycles, N_GLANCE, SEED, steps)
+        return [self._typical(at) if typical else sum(float(r @ r) for r in at.values()) for at in left]
+
+    def _typical(self, left: dict[int, Array]) -> float:
+        n, total = 0, 0.0
+        for cycle, r in left.items():
+            for at in self.plant.slices[int(self.plant.data.motion[cycle])].values():
+                n += len(r[at])
+                total += len(r[at]) * float(np.log1p(np.mean(r[at] ** 2)))
+        return n * float(np.expm1(total / n))
+
+
+def stripped(model: Model, effect: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:
+    """Effects, free parameters and point of a model without one of its effects."""
+    own = {f.name for f in effect.frees}
+    point = {name: x for name, x in model.fit.point.items() if not name.startswith(f"{effect.effect}.")}
+    effects = tuple(c for c in model.effects if c != effect)
+    return effects, tuple(f for f in model.fit.free if f.name not in own), point
+
+
+def start_model(search: Search, faults: Point) -> Model:
+    """Faults only, from where they are expected."""
+    return search.model((), K_FREE, faults, None, 5)
