@@ -13,7 +13,7 @@ from .candidates import Candidate, candidates
 from .features import Array
 from .fit import SEED, Free, bounded, bounds, moved, residuals, stacked_jacobian
 from .plant import Point
-from .search import N_GLANCE, Model, Search
+from .search import FAR, N_GLANCE, Model, Search
 
 N_PROBE, N_PROBE_HIDDEN = 8, 24  # seeds of a column that only screens; of one that is hardly felt
 WIDER = 3.0  # times the step of an effect that is hardly felt
@@ -102,17 +102,23 @@ def _starts_with(search: Search, model: Model, found: Sequence[Candidate], fault
 
 
 def simulated(search: Search, model: Model, screened: Sequence[Screened]) -> list[Screened]:
-    """Candidates by what their starts leave when simulated: far from the data first order promises little."""
+    """Candidates by what their starts leave when simulated, where first order promises little.
+
+    So far from the data, where faults stand for anything. Near it first order misses what has a threshold, as dead time
+    that acts where a current is small: there sizes are tried beside the faults, in steps that show a microsecond.
+    """
+    far = model.excess > FAR
     motions = search.plant.data.motion
     cycles = [next(c for c in search.train if motions[c] == m) for m in sorted({int(motions[c]) for c in search.train})]
     none = dict.fromkeys(FAULTS, 0.0)
     alone = _starts_with(search, model, [s.candidate for s in screened], none)
+    beside = {**model.fit.point, **none} if far else model.fit.point
     starts = [
-        [s.start, other, *({**model.fit.point, **none, **size} for size in s.candidate.sizes())]
+        [s.start, other, *({**beside, **size} for size in s.candidate.sizes())]
         for s, other in zip(screened, alone, strict=True)
     ]
     points = [point for of in starts for point in of]
-    here, *there = search.costs([model.fit.point, *points], cycles, typical=True, steps=(DT_PROBE,))
+    here, *there = search.costs([model.fit.point, *points], cycles, typical=True, steps=(DT_PROBE,) if far else None)
     cost = sum(float(r @ r) for r in model.fit.residuals.values())
     costs = iter(there)
     ranked = []
