@@ -16,7 +16,7 @@ from .cycles import Measured
 from .gear import swinging
 from .growing import beside, growing, said, widened
 from .noise import Noise, Verdict
-from .paths import faults_only, gone_on, resume, shortest, with_faults
+from .paths import beside_steady, faults_only, gone_on, resume, shortest, with_faults
 from .plant import EmaPlant
 from .play import as_held, with_friction
 from .search import Model, Search
@@ -83,10 +83,13 @@ def examine(
     search = Search(ema, Noise(ema, {}), train, heldout, say)
     paths = faults_only(search, {})
     of_each = None if paths[0].verdict.is_noise else growing(search, paths[0].before)
+    steady = search
     if of_each is not None:
         search = with_faults(search, of_each, {})
         paths = faults_only(search, search.noise.point)
     path = shortest(search, paths)
+    if of_each is not None and path.after.effects and (other := beside_steady(steady, path)) is not None:
+        of_each, search, path = None, steady, other
     for turn in range(N_BESIDE):
         if of_each is None or not path.after.effects:
             break

@@ -31,13 +31,18 @@ FLUX, FLUX_STEP = "magnet_flux", 0.03
 CHANGE, PER_KELVIN = f"{FLUX}.change", f"{FLUX}.per_kelvin"
 
 
+def is_steady(search: Search, model: Model) -> bool:
+    """Whether cycles of one motion differ by chance alone."""
+    cycles = range(search.plant.data.n_cycles)
+    return _differ(search, residuals(search.plant, search.noise, model.fit.point, cycles, N_SEEDS)) < DIFFER
+
+
 def growing(search: Search, model: Model) -> Array | None:
     """Faults of each cycle, shape (n_cycles, 6), if these explain what cycles of one motion differ by."""
-    cycles = range(search.plant.data.n_cycles)
-    left = residuals(search.plant, search.noise, model.fit.point, cycles, N_SEEDS)
-    if _differ(search, left) < DIFFER:
+    if is_steady(search, model):
         return None
     search.say("cycles of one motion differ: faults of each")
+    cycles = range(search.plant.data.n_cycles)
     fits = _each(search, model.fit)
     left = {c: fitted.residuals[c] for c, fitted in zip(cycles, fits, strict=True)}
     faults = _faults(search, fits)

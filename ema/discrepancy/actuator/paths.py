@@ -9,6 +9,7 @@ from ema.core.names import FAULTS
 from .comparators import PLAIN, take_step
 from .features import Array
 from .forward import CLOSE, exchanged, grown
+from .growing import is_steady
 from .noise import Noise, Verdict
 from .plant import EmaPlant, Point
 from .search import CHANCE, Model, Search, start_model
@@ -67,6 +68,20 @@ def gone_on(search: Search, path: Path) -> Path:
     v, known = search.verdict(after), Path.of(search, before)
     begun = replace(known, tried=path.tried, after=after, verdict=v, alike=path.alike, as_well=path.as_well)
     return _gone(search, begun)
+
+
+def beside_steady(search: Search, path: Path) -> Path | None:
+    """A path found beside faults of each cycle, gone to its end beside steady ones if with its effects these will do.
+
+    What is missing in a simulation may make cycles of one motion differ by more than its noise.
+    """
+    search.noise = Noise(search.plant, path.after.fit.point)
+    model = search.model(path.after.effects, path.after.fit.free, path.after.fit.point, None, 4)
+    search.noise = Noise(search.plant, model.fit.point)
+    if not is_steady(search, model):
+        return None
+    search.say("beside what was found, cycles of one motion differ by chance alone")
+    return gone_on(search, replace(path, after=model))
 
 
 def faults_only(search: Search, faults: Point) -> list[Path]:
