@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .comparators import PLAIN
+from .comparators import PLAIN, take_step
 from .noise import Noise, Verdict
 from .screening import promising
 from .search import CHANCE, FAR, Model, Search
@@ -59,6 +59,32 @@ def grown(
             after, v = at_the_minimum(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
+
+
+def instead_of_all(
+    search: Search, before: Model, model: Model, v: Verdict, alike: list[tuple[str, ...]]
+) -> tuple[Model, Verdict]:
+    """`model`, or one that begins with another first effect, simulated since first order had promised little of it.
+
+    A commutation that is far off promises less than a torque line that follows what it does.
+    """
+    if v.is_noise or before.excess >= FAR or is_enough(model, before):
+        return model, v
+    singly = [m for m in search.tried if len(m.effects) == 1]
+    found = _by_themselves(search, extend(search, before, promising(search, before), singly), before)
+    if not found or found[0].excess > CLOSE * model.excess:
+        return model, v
+    noise, step, late = search.noise, search.plant.step, search.plant.late
+    sets: list[tuple[str, ...]] = [tuple(m.names[-1] for m in found[1:] if is_alike(m, found[0]))]
+    made, w = surely(search, found[0], search.verdict(found[0]))
+    made, w = grown(search, before, made, w, sets)
+    if not w.is_noise and made.excess > CLOSE * model.excess:
+        search.noise, search.plant.late = noise, late
+        take_step(search.plant, step)
+        return model, v
+    search.say(f"{' + '.join(made.names)} instead of {' + '.join(model.names) or 'nothing'}")
+    alike[:] = sets
+    return made, w
 
 
 def exchanged(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:

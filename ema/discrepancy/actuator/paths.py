@@ -8,7 +8,7 @@ from ema.core.names import FAULTS
 
 from .comparators import PLAIN, take_step
 from .features import Array
-from .forward import CLOSE, exchanged, grown
+from .forward import CLOSE, exchanged, grown, instead_of_all
 from .growing import is_steady
 from .noise import Noise, Verdict
 from .plant import EmaPlant, Point
@@ -150,6 +150,7 @@ def _gone(search: Search, begun: Path) -> Path:
             if after is before:
                 before, verdict_before = other, w
             after, v = grown(search, before, other, w, alike)
+    after, v = instead_of_all(search, before, after, v, alike)
     if verdict_before.is_noise:
         after, v = simpler(search, before, after, v, alike, as_well)
     plant = search.plant

@@ -31,6 +31,8 @@ def extend(search: Search, model: Model, screened: Sequence[Screened], known: Se
         screened = simulated(search, model, screened)
     refined = _for_several_faults(search, model, screened)
     refined |= _likeliest(search, model, screened, set(refined))
+    if not refined:
+        return []
     best = min(refined.values(), key=lambda m: m.heldout)
     for s in looking_like(search, model, best, screened, set(refined)):
         m = _refined(search, model, s)
