@@ -14,4 +14,5 @@ EFFECT = Effect(
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema",),
     limits={"limit": POSITIVE},
+    place="recorder",
 )

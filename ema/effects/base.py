@@ -31,7 +31,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 HOOKS = MappingProxyType(
     {
@@ -103,6 +103,9 @@ class Effect:
         Of parameters that cannot have just any value.
     least_sd : mapping of str to float
         Standard deviation below which no estimate is claimed, where honest simulations of the same law differ by it.
+    place : str
+        Where it acts: in the ``plant``, on a signal of the control ``loop``, or in the ``recorder`` alone, which the
+        controller does not notice.
     """
 
     name: str
@@ -115,6 +118,7 @@ class Effect:
     besides: Mapping[str, str] = field(default_factory=dict)
     limits: Mapping[str, Limit] = field(default_factory=dict)
     least_sd: Mapping[str, float] = field(default_factory=dict)
+    place: Literal["plant", "loop", "recorder"] = "plant"
 
     def __post_init__(self) -> None:
         unknown = set(self.laws) - set(HOOKS)

@@ -27,4 +27,5 @@ EFFECT = Effect(
     mistaken_for=("k1", "k2"),
     plants=("ema", "axis"),
     limits={"rate": SHARE, "shared": SHARE, "currents": SHARE},
+    place="recorder",
 )

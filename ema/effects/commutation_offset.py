@@ -15,4 +15,5 @@ EFFECT = Effect(
     separated_by="back-EMF at constant speed with the inverter off",
     mistaken_for=("k3", "k4", "k5", "k6"),
     plants=("ema",),
+    place="loop",
 )

@@ -26,4 +26,5 @@ EFFECT = Effect(
     plants=("ema",),
     limits={"change": NOT_REVERSED},
     least_sd={"change": 3e-3},  # half a microsecond, of the comparators' grid, in 159 µs of both stages together
+    place="recorder",
 )

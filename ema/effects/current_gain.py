@@ -15,4 +15,5 @@ EFFECT = Effect(
     separated_by="all three phase currents at rest under load: their sum must vanish",
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema",),
+    place="loop",
 )

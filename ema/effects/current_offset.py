@@ -15,4 +15,5 @@ EFFECT = Effect(
     separated_by="currents with the inverter off",
     mistaken_for=("k1", "k3", "k4", "k5"),
     plants=("ema",),
+    place="loop",
 )

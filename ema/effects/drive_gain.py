@@ -11,4 +11,5 @@ EFFECT = Effect(
     separated_by="a known load (weight on a lever), or a second sensor",
     mistaken_for=("k1",),
     plants=("axis",),
+    place="recorder",
 )

@@ -11,4 +11,5 @@ EFFECT = Effect(
     separated_by="a record with the drive switched off",
     mistaken_for=("k1",),
     plants=("axis",),
+    place="recorder",
 )

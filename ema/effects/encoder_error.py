@@ -14,4 +14,5 @@ EFFECT = Effect(
     separated_by="constant speed over many turns",
     laws={"position_error": error},
     plants=("axis",),
+    place="recorder",
 )

@@ -12,4 +12,5 @@ EFFECT = Effect(
     mistaken_for=("k1", "k3", "k4", "k5"),
     plants=("ema", "axis"),
     limits={"time": NOT_NEGATIVE},
+    place="loop",
 )

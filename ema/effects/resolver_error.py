@@ -26,4 +26,5 @@ EFFECT = Effect(
     laws={"angle_error": error},
     mistaken_for=("k6",),
     plants=("ema", "axis"),
+    place="loop",
 )

@@ -20,6 +20,7 @@ from .batch import Effects, cold_start, parameters, start_at
 from .envelope import envelope
 from .hf_kernel import OUTPUTS, integrate
 from .layout import ENERGIES, N_ROWS, N_STATE, row
+from .recorder import write_as_recorded
 
 N_LANES = 16
 DT = 1e-6  # [s]
@@ -162,6 +163,7 @@ def simulate(
         for runs in batches:
             batch(runs)
 
+    write_as_recorded(out, z, T)
     i = out[:, :3] + current_noise
     if noise:
         limit = np.minimum(z[row("adc_saturation.limit")], plant.sensors.adc_range)[:, None, None]
@@ -210,7 +212,8 @@ def _noise(
 
 def _ring(z: np.ndarray, T: float, n_recorded: int) -> int:
     """Control ticks to be remembered for the delays of a batch: before the first sample there is nothing to see."""
-    longest = max(z[row(f"{signal}_delay.time")].max() for signal in ("position", "speed"))
+    position = z[row("position_delay.time")] + z[row("controller_delay.time")]
+    longest = max(position.max(), z[row("speed_delay.time")].max())
     ticks = min(longest / (T * (1.0 + z[row("clock_skew.shared")].min())), n_recorded)
     return max(N_RING, int(np.ceil(ticks)) + 2)
 

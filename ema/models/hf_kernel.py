@@ -228,6 +228,7 @@ def delayed(history, tick, l, delay_ticks):
 
 
 POSITION_DELAY, SPEED_DELAY = row("position_delay.time"), row("speed_delay.time")
+CONTROLLER_DELAY = row("controller_delay.time")  # behind the recorder's tap
 
 
 @njit(fastmath=jit.FAST, error_model="numpy", cache=True, nogil=True)
@@ -258,6 +259,7 @@ def integrate(z, command, lvdt_noise, out, history, dt, n_substeps, lanes, parts
         for l in range(N):
             step = z[LVDT_STEP * N + l]
             theta_u_meas = step * round((z[THETA_U * N + l] + lvdt_noise[tick, l]) / step)
+            theta_u_seen = theta_u_meas  # by the controller
             theta_m_meas, w_m_meas = z[THETA_M * N + l], z[W_M * N + l]
             if len(parts) & SENSORS:
                 zero = (z[COMMUTATION * N + l] - z[APART * N + l]) / z[P * N + l]
@@ -267,9 +269,11 @@ def integrate(z, command, lvdt_noise, out, history, dt, n_substeps, lanes, parts
                 theta_m_meas += error
                 history[0, tick % history.shape[1], l] = theta_u_meas
                 history[1, tick % history.shape[1], l] = w_m_meas
-                theta_u_meas = delayed(history[0], tick, l, z[POSITION_DELAY * N + l] / T)
+                late = z[POSITION_DELAY * N + l]
+                theta_u_meas = delayed(history[0], tick, l, late / T)
+                theta_u_seen = delayed(history[0], tick, l, (late + z[CONTROLLER_DELAY * N + l]) / T)
                 w_m_meas = delayed(history[1], tick, l, z[SPEED_DELAY * N + l] / T)
-            control(z, l, N, command[tick, l], theta_u_meas, w_m_meas)
+            control(z, l, N, command[tick, l], theta_u_seen, w_m_meas)
             out[0, tick, l] = z[LAG2_A * N + l]
             out[1, tick, l] = z[LAG2_B * N + l]
             out[2, tick, l] = z[LAG2_C * N + l]

@@ -28,6 +28,7 @@ OF_STRUCTURAL = {  # effects without laws that the kernel reads itself
     "current_gain": SENSORS,
     "current_offset": SENSORS,
     "commutation_offset": SENSORS,
+    "controller_delay": SENSORS,
     "position_delay": SENSORS,
     "speed_delay": SENSORS,
     "supply_sag": INVERTER,

@@ -1,0 +1,20 @@
+"""Gain errors of the recorder's own currents: the controller sees the true current, the record does not."""
+
+from __future__ import annotations
+
+from .base import Effect, Parameter
+
+EFFECT = Effect(
+    name="recorder_gain",
+    parameters=(
+        Parameter("gain_a", "1", 0.0, -0.1, 0.1, 0.01, "relative gain error of the recorded current of phase A"),
+        Parameter("gain_b", "1", 0.0, -0.1, 0.1, 0.01, "relative gain error of the recorded current of phase B"),
+        Parameter("gain_c", "1", 0.0, -0.1, 0.1, 0.01, "relative gain error of the recorded current of phase C"),
+    ),
+    sentence="the recorder reads {gain_a:+.1%}, {gain_b:+.1%}, {gain_c:+.1%} (phases A, B, C) of the true current; "
+    "the controller does not",
+    separated_by="all three phase currents at rest under load, recorded and as the controller sees them",
+    mistaken_for=("k3", "k4", "k5"),
+    plants=("ema",),
+    place="recorder",
+)
