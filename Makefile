@@ -66,12 +66,13 @@ uninstall:
 	tools/install_service uninstall
 
 # Locked versions for all Pythons and platforms, with hashes (needs `uv`).
-# requirements-run.lock is the installed service's: the same versions without the tools.
+# requirements-run.lock is the installed monitor's, requirements-hf.lock the same with the HF worker's: the same versions without the tools.
 COMPILE := uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links --quiet \
   --custom-compile-command "make lock"
 lock:
-	$(COMPILE) --group dev pyproject.toml -o requirements.lock
-	$(COMPILE) --constraint requirements.lock pyproject.toml -o requirements-run.lock
+	$(COMPILE) --extra all --group dev pyproject.toml -o requirements.lock
+	$(COMPILE) --extra monitor --constraint requirements.lock pyproject.toml -o requirements-run.lock
+	$(COMPILE) --extra build --constraint requirements.lock pyproject.toml -o requirements-hf.lock
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info

@@ -19,6 +19,10 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
       ema daemon --config config/daemon.yaml --bus vcan0
     """
     import logging
+    import sys
+
+    # python-can loads asammdf, and pandas with it, wherever they are installed: 80 MB that a monitor never uses.
+    sys.modules.setdefault("asammdf", None)  # type: ignore[arg-type]
 
     from ema.bus import interface
     from ema.core.errors import EmaError, Failure

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 import click
 
-from ema.core.errors import EmaError, Failure, NegativeAnswer
+from ema.core.errors import ConfigError, EmaError, Failure, NegativeAnswer
 from ema.core.version import version
 
 # Before numpy is loaded: matrices here are small, and threads of a linear algebra library that wait for each other cost
@@ -32,6 +32,20 @@ class _Programs(click.Group):
             command: Any = entry.load()
             return command
         return None
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the subcommand; what its extra would have brought and is not here, is said in one line."""
+        try:
+            return super().invoke(ctx)
+        except ModuleNotFoundError as error:
+            if (error.name or "ema").split(".")[0].startswith("ema"):
+                raise
+            name = str(ctx.invoked_subcommand)
+            (entry,) = entry_points(group="ema.commands", name=name)
+            extra = f"[{','.join(entry.extras)}]" if entry.extras else ""
+            raise ConfigError(
+                f"{name}: the package '{error.name}' is not installed: python -m pip install 'ema-monitor{extra}'"
+            ) from error
 
 
 def _tell_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:

@@ -37,7 +37,7 @@ def executor(workers: int | None = None, scheduler: str | None = None) -> Iterat
     try:
         from distributed import Client
     except ImportError as error:
-        raise ConfigError("--scheduler needs Dask: pip install 'ema-monitor[cluster]'") from error
+        raise ConfigError("--scheduler needs Dask: pip install 'ema-monitor[fleet]'") from error
     try:
         client = Client(scheduler, timeout="10s", set_as_default=False)
     except (OSError, ValueError) as error:

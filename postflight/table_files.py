@@ -63,7 +63,7 @@ class _Parquet:
             import pyarrow as pa
             import pyarrow.parquet as pq
         except ImportError as error:
-            raise LogError("Parquet needs pyarrow: pip install 'ema-monitor[tables]'") from error
+            raise LogError("Parquet needs pyarrow: pip install 'ema-monitor[analyse]'") from error
         self._arrow = pa
         kinds = [_arrow_type(pa, values) for values in block.values]
         self._schema = pa.schema(

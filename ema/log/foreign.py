@@ -85,7 +85,7 @@ def _messages(path: Path) -> Iterator[Any]:
     except OSError as error:
         raise LogError(f"{path}: cannot be read ({error.strerror or error})") from error
     except (NotImplementedError, ImportError) as error:
-        raise LogError(f"{path}: needs a package that is not installed ({error}); try ema-monitor[logs]") from error
+        raise LogError(f"{path}: needs a package that is not installed ({error}); try ema-monitor[analyse]") from error
     except Exception as error:  # parsers of text and binary formats let anything through on a damaged file
         why = _NO_FRAMES if _suffix(path) == ".csv" else f"{type(error).__name__}: {error}"
         raise LogError(f"{path}: is damaged or not what its name says ({why})") from error

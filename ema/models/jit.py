@@ -7,7 +7,12 @@ Import this module before anything that is jitted with ``cache=True``.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
+import logging
+import os
+import shutil
+import tempfile
 from pathlib import Path
 
 import numba
@@ -23,7 +28,32 @@ def equations_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-numba.config.CACHE_DIR = str(Path(platformdirs.user_cache_dir("ema")) / f"kernels-{equations_digest()}")  # type: ignore[attr-defined]
+def cache_folder() -> Path:
+    """The user's cache folder, or, where nothing can be written there, one that lives as long as this process."""
+    folder = Path(platformdirs.user_cache_dir("ema")) / f"kernels-{equations_digest()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        logging.getLogger("ema").warning(
+            "%s cannot be written (%s): kernels are compiled again by each process, some seconds; "
+            "XDG_CACHE_HOME names another folder",
+            folder,
+            error.strerror,
+        )
+    own = Path(tempfile.mkdtemp(prefix="ema-kernels-"))
+    atexit.register(_remove, own, os.getpid())
+    return own
+
+
+def _remove(folder: Path, owner: int) -> None:
+    """At the end of the process that made it, not of those forked from it."""
+    if os.getpid() == owner:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+numba.config.CACHE_DIR = str(cache_folder())  # type: ignore[attr-defined]
 
 # What the compiler may do to floating-point arithmetic. Not `reassoc`: dt/J, known early, would become a division at
 # the end of the path that each step waits for.
