@@ -21,8 +21,8 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
     import logging
     import sys
 
-    # python-can loads asammdf, and pandas with it, wherever they are installed: 80 MB that a monitor never uses.
-    sys.modules.setdefault("asammdf", None)  # type: ignore[arg-type]
+    # python-can and pint load these, and pandas with them, where they are installed: 80 MB that a monitor never uses.
+    sys.modules.update(dict.fromkeys(("asammdf", "dask")))  # type: ignore[arg-type]
 
     from ema.bus import interface
     from ema.core.errors import EmaError, Failure
