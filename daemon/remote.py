@@ -11,7 +11,8 @@ from ema.identification import Estimate
 from ema.monitor import Job
 
 from . import wire
-from .wire import WireError
+from .answer import unpack_answer
+from .wire import WireError, WrongAnswer
 
 
 class RemoteRunner:
@@ -32,13 +33,18 @@ class RemoteRunner:
 
     def run(self, job: Job) -> Estimate:
         """The estimate a job asks for; WireError when there is none."""
-        line = wire.pack_job(job, self._bundles[job.actuator])
+        bundle = self._bundles[job.actuator]
+        line = wire.pack_job(job, bundle)
         try:
             answer = self._ask(line)
         except OSError as error:
             self.close()
             raise WireError(f"worker at {self._path} does not answer ({error.strerror or error})") from error
-        return wire.unpack_answer(answer)
+        try:
+            return unpack_answer(answer, job, bundle)
+        except WrongAnswer:
+            self.close()  # what comes next on this connection may be late as well
+            raise
 
     def _ask(self, line: bytes) -> bytes:
         if self._socket is None:

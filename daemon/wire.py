@@ -1,7 +1,6 @@
 """What daemon and worker process say to each other over a Unix socket: one line of JSON for a job, one for its answer.
 
-Floats go through JSON without losing a bit; NaN is null. Of an estimate stays behind what only its intervals are made
-from (`marginals`, `edges`): the monitor asks for none.
+Floats go through JSON without losing a bit; NaN is null. Answers have a file of their own, `answer`.
 """
 
 from __future__ import annotations
@@ -13,18 +12,19 @@ import numpy as np
 
 from ema.bundle import Bundle
 from ema.core.config import digest
-from ema.core.status import Reason, Status
-from ema.identification import Estimate, Measurement, NuisanceEstimate
+from ema.core.status import Reason
+from ema.identification import Measurement
 from ema.monitor import Job
 
 MAX_LINE = 1 << 20  # [B]
-_ARRAYS = ("k", "sd", "covariance", "residual")
-_NUMBERS = ("chi2", "p_value")
-_NUISANCE = ("value", "sd", "covariance", "interval95")  # arrays of a NuisanceEstimate
 
 
 class WireError(Exception):
-    """The other side is not there, does not answer, or says what makes no sense."""
+    """The other side is not there, does not answer, says why it cannot, or says what makes no sense."""
+
+
+class WrongAnswer(WireError):
+    """An answer that cannot be that to the job: whoever gives it is not listened to any more."""
 
 
 def fingerprint(bundle: Bundle) -> str:
@@ -36,15 +36,15 @@ def fingerprint(bundle: Bundle) -> str:
 def pack_job(job: Job, bundle: Bundle) -> bytes:
     """A job as a line."""
     m = job.measurement
-    return _line(
+    return to_line(
         {
             "bundle": fingerprint(bundle),
             "method": job.method,
             "actuator": job.actuator,
             "cycle": job.cycle,
             "t_ns": job.t_ns,
-            "i_hat": _plain(m.i_hat),
-            "start": None if m.start is None else _plain(m.start),
+            "i_hat": plain(m.i_hat),
+            "start": None if m.start is None else plain(m.start),
             "valid": m.valid.tolist(),
         }
     )
@@ -66,49 +66,8 @@ def unpack_job(line: bytes) -> tuple[Job, str]:
         raise WireError("a job makes no sense") from error
 
 
-def pack_answer(answer: Estimate | Exception) -> bytes:
-    """An estimate, or why there is none, as a line."""
-    if isinstance(answer, Exception):
-        return _line({"error": " ".join(str(answer).split()) or repr(answer)})
-    content = {name: _plain(getattr(answer, name)) for name in _ARRAYS}
-    content |= {name: None if np.isnan(x := getattr(answer, name)) else float(x) for name in _NUMBERS}
-    content["unseparable"] = [_plain(direction) for direction in answer.unseparable]
-    codes = {"dof": int(answer.dof), "status": int(answer.status), "reasons": int(answer.reasons)}
-    return _line({"method": answer.method, **content, **codes, "nuisance": _pack_nuisance(answer.nuisance)})
-
-
-def _pack_nuisance(beside: NuisanceEstimate | None) -> dict[str, Any] | None:
-    if beside is None:
-        return None
-    numbers = {name: _plain(getattr(beside, name)) for name in _NUISANCE}
-    return {"names": list(beside.names), "units": list(beside.units), **numbers}
-
-
-def _unpack_nuisance(said: dict[str, Any] | None) -> NuisanceEstimate | None:
-    if said is None:
-        return None
-    return NuisanceEstimate(tuple(said["names"]), tuple(said["units"]), *(_array(said[name]) for name in _NUISANCE))
-
-
-def unpack_answer(line: bytes) -> Estimate:
-    """The estimate; WireError when there is none or the line makes no sense."""
-    said = _read(line)
-    if "error" in said:
-        raise WireError(str(said["error"]))
-    try:
-        k, sd, covariance, residual = (_array(said[name]) for name in _ARRAYS)
-        chi2, p_value = (float(_array(said[name])) for name in _NUMBERS)
-        status, reasons = Status(said["status"]), Reason(said["reasons"])
-        return Estimate(
-            *(str(said["method"]), k, sd, covariance, chi2, int(said["dof"]), p_value, residual, status, reasons),
-            unseparable=tuple(_array(direction) for direction in said["unseparable"]),
-            nuisance=_unpack_nuisance(said["nuisance"]),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise WireError("an answer makes no sense") from error
-
-
-def _line(content: dict[str, Any]) -> bytes:
+def to_line(content: dict[str, Any]) -> bytes:
+    """One line of JSON."""
     return json.dumps(content, allow_nan=False).encode() + b"\n"
 
 
@@ -122,10 +81,11 @@ def _read(line: bytes) -> dict[str, Any]:
     return said
 
 
-def _plain(x: np.ndarray) -> Any:
-    plain = x.astype(object)
-    plain[np.isnan(x)] = None
-    return plain.tolist()
+def plain(x: np.ndarray) -> Any:
+    """An array as nested lists, NaN as None."""
+    values = x.astype(object)
+    values[np.isnan(x)] = None
+    return values.tolist()
 
 
 def _array(values: Any) -> np.ndarray:

@@ -9,10 +9,9 @@ from pathlib import Path
 
 from ema.bundle import Bundle
 from ema.core.errors import BusError
-from ema.identification import Estimate
 from ema.monitor import Job, Runner
 
-from . import wire
+from . import answer, wire
 from .wire import WireError
 
 _LOOK_UP = 0.2  # how often a stop is looked for [s]
@@ -73,18 +72,18 @@ class Server:
             while b"\n" in waiting and not stop.is_set():
                 line, _, waiting = waiting.partition(b"\n")
                 try:
-                    _send(connection, wire.pack_answer(self._answer(bytes(line))), stop)
+                    _send(connection, self._answer(bytes(line)), stop)
                 except OSError:
                     return
 
-    def _answer(self, line: bytes) -> Estimate | Exception:
+    def _answer(self, line: bytes) -> bytes:
         try:
             job, fingerprint = wire.unpack_job(line)
             if self._fingerprints.get(job.actuator) != fingerprint:
-                return WireError(f"the worker has another bundle for actuator {job.actuator}")
-            return self._runner.run(job)
+                raise WireError(f"the worker has another bundle for actuator {job.actuator}")
+            return answer.pack_answer(self._runner.run(job), job, fingerprint)
         except Exception as error:  # the answer, whatever it is
-            return error
+            return answer.pack_error(error)
 
     def prepare(self, jobs: list[Job]) -> None:
         """Run jobs once, so that whatever is compiled is compiled before the first real one."""
@@ -92,9 +91,9 @@ class Server:
             self._runner.run(job)
 
 
-def _send(connection: socket.socket, answer: bytes, stop: threading.Event) -> None:
+def _send(connection: socket.socket, line: bytes, stop: threading.Event) -> None:
     """All of it, however slowly the daemon reads; once `stop` is set, one that does not read is not waited for."""
-    left = memoryview(answer)
+    left = memoryview(line)
     while left:
         try:
             left = left[connection.send(left) :]

@@ -7,8 +7,9 @@ import threading
 import cantools
 import numpy as np
 import pytest
-from ema_daemon import wire
+from ema_daemon.answer import pack_answer, unpack_answer
 from ema_daemon.service import Service
+from ema_daemon.wire import fingerprint
 from ema_daemon.worker import Worker
 from ema_postflight.live import Live
 from ema_postflight.page import page
@@ -17,9 +18,10 @@ from ema_postflight.watch import draw
 
 from ema.bus import codec as codecs
 from ema.core import config, resources
-from ema.identification import Measurement, identifier
+from ema.core.status import Reason
+from ema.identification import Measurement
 from ema.log import LogReader, LogWriter
-from ema.monitor import Monitor, MonitorSettings, Runner
+from ema.monitor import Job, Monitor, MonitorSettings, Runner
 
 FLUX = -0.05
 
@@ -85,8 +87,9 @@ def test_it_is_shown_beside_the_faults(ran):
 
 def test_the_worker_process_says_it_too(flux_bundle):
     i = flux_bundle.i0[flux_bundle.schedule]
-    e = identifier("lf2", flux_bundle).estimate(Measurement.complete(1.02 * i, np.zeros(2)))
-    again = wire.unpack_answer(wire.pack_answer(e)).nuisance
+    job = Job(0, 0, 7, "lf2", Measurement.complete(1.02 * i, np.zeros(2)), Reason(0))
+    e = Runner({0: flux_bundle}).run(job)
+    again = unpack_answer(pack_answer(e, job, fingerprint(flux_bundle)), job, flux_bundle).nuisance
     assert again.names == e.nuisance.names
     for name in ("value", "sd", "covariance", "interval95"):
         assert np.array_equal(getattr(again, name), getattr(e.nuisance, name))
