@@ -56,3 +56,21 @@ class LogState(IntEnum):
     FULL = 1  # no room: nothing is written until there is
     FAILED = 2  # the device refuses writes for another reason
     OFF = 3  # none configured
+
+
+class AlarmLevel(IntEnum):
+    """How urgent an alarm is."""
+
+    NONE = 0
+    WATCH = 1  # look at it at the next occasion
+    ALARM = 2  # repair before the next flight
+
+
+class AlarmState(IntEnum):
+    """State of an alarm, after ISA-18.2."""
+
+    INACTIVE = 0  # normal
+    ACTIVE = 1  # the condition holds, nobody has acknowledged it
+    ACKNOWLEDGED = 2  # the condition holds, somebody has seen it
+    LATCHED_CLEARED = 3  # the condition has gone, the alarm stands until acknowledged or, where it latches, cleared
+    SHELVED = 4  # taken out of sight for some time by an operator
