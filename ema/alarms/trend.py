@@ -66,7 +66,7 @@ class Trend:
         self._count *= forget
 
     def line(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """k now, its rate and the rate's standard deviation, each of shape (6,); None before they are known"""
+        """k now, its rate and the rate's standard deviation, each of shape (6,); None before they are known."""
         s0, s1, s2 = self._once
         det = s0 * s2 - s1**2
         if self._n < self._least or not (det > 1e-9 * s0 * s2).all():

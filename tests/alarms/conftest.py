@@ -9,6 +9,7 @@ from ema.core.status import Reason, Status
 
 T0 = 1_741_943_700_000_000_000
 SECOND = 1_000_000_000
+NOTHING = Reason(0)
 
 
 @pytest.fixture(scope="session")
@@ -20,7 +21,7 @@ def settings():
 def judged():
     """An estimate of one cycle a second, of actuator 0."""
 
-    def make(cycle, actuator=0, sd=0.002, status=Status.VALID, reasons=Reason(0), **faults):
+    def make(cycle, actuator=0, sd=0.002, status=Status.VALID, reasons=NOTHING, **faults):
         k = np.array([faults.get(f"k{j}", 0.0) for j in range(1, 7)])
         return Judged(T0 + cycle * SECOND, actuator, cycle, k, np.full(6, sd), status, reasons)
 
