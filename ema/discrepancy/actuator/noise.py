@@ -9,6 +9,8 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import gamma
 
+from ema.discrepancy.engine.statistic import shrunk_correlation
+
 from .cycles import Measured
 from .features import Array
 from .plant import EmaPlant, Point
@@ -55,19 +57,6 @@ def whitened(L: Array, x: Array) -> Array:
     return np.asarray(solve_triangular(L, np.atleast_2d(x).T, lower=True, check_finite=False).T.reshape(np.shape(x)))
 
 
-def shrinkage(z: Array) -> float:
-    """Weight of the diagonal in the estimate of a correlation matrix from standardised rows z (n, d).
-
-    λ = Σ Var(r_ij) / Σ r_ij²  over i ≠ j  (Schäfer and Strimmer, Stat. Appl. Genet. Mol. Biol. 4, 2005).
-    """
-    n = len(z)
-    r = z.T @ z / (n - 1)
-    second = (z**2).T @ (z**2) / (n - 1)
-    variance = (second - r**2) / n
-    off = ~np.eye(z.shape[1], dtype=bool)
-    return float(np.clip(variance[off].sum() / max((r[off] ** 2).sum(), 1e-300), 0.02, 1.0))
-
-
 def motion_noise(plant: EmaPlant, point: Point, motion: int, n_runs: tuple[int, int] = N_RUNS) -> MotionNoise:
     """Simulate cycles of a motion many times and describe how runs of one cycle differ.
 
@@ -93,9 +82,7 @@ def motion_noise(plant: EmaPlant, point: Point, motion: int, n_runs: tuple[int, 
     step = (np.arange(n) % len(plant.noise_steps)).reshape(len(cycles), each).T.ravel()[n_seen:]
     sd = np.sqrt((x**2).mean(axis=0))
     z = x / sd
-    correlation = (1.0 - shrinkage(z)) * (z.T @ z / len(z))
-    np.fill_diagonal(correlation, 1.0)
-    L = cholesky(correlation, lower=True, check_finite=False)
+    L = cholesky(shrunk_correlation(z), lower=True, check_finite=False)
     return MotionNoise(sd, L, deviations(runs.envelopes).std(axis=0), whitened(L, new / sd), step)
 
 

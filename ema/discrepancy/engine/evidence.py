@@ -1,0 +1,158 @@
+"""The evidence of a set of causes: its likelihood integrated over sizes, over subsets of faults and over δ.
+
+About the fitted point the mean is taken for linear, t = μ̂ + J (x - x̂). A size is zero or drawn from a mixture of
+normal distributions of several widths (one Gaussian slab against sizes that are uniform in their logarithm costs nine
+points of calibration), cut at what is credible. Then all integrals are of Gaussians over boxes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.special import log_ndtr, logsumexp
+
+from .hypothesis import Array, Parameter
+from .law_error import SHARES, LawError
+from .statistic import Prediction
+
+WIDTHS = (0.25, 1.0, 4.0)  # of the slab, times the usual size
+WEIGHTS = (0.25, 0.5, 0.25)
+FAULT = 0.3  # prior probability that one fault is there
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Log evidence of one set of causes, what each fault's probability is, and the posterior at its best subset.
+
+    Attributes
+    ----------
+    log_z : float
+        Without the prior of the set.
+    p_fault : array, shape (n_faults,)
+        Probability that each fault is there.
+    mean, sd : arrays, shape (n_faults + n_parameters,)
+        Of faults and of the causes' parameters, over all subsets.
+    """
+
+    log_z: float
+    p_fault: Array
+    mean: Array
+    sd: Array
+
+
+def log_mass(low: Array, high: Array) -> Array:
+    """log P(low < u < high) of a standard normal u, exact far in its tails."""
+    swap = low > 0.0
+    a, b = np.where(swap, -high, low), np.where(swap, -low, high)
+    upper, lower = log_ndtr(b), log_ndtr(a)
+    return np.asarray(upper + np.log1p(-np.exp(np.minimum(lower - upper, -1e-300))))
+
+
+def log_box(mean: Array, cov: Array, low: Array, high: Array) -> Array:
+    """Log probability of a box under normal distributions, by truncating one coordinate after another.
+
+    Mendell and Elston, Biometrics 30, 1974. Coordinates without variance are inside.
+
+    Parameters
+    ----------
+    mean : array, shape (n, p)
+    cov : array, shape (n, p, p)
+    low, high : arrays, shape (p,)
+    """
+    m, V = mean.copy(), cov.copy()
+    total = np.zeros(len(m))
+    for i in range(m.shape[1]):
+        there = V[:, i, i] > 0.0
+        sd = np.sqrt(np.where(there, V[:, i, i], 1.0))
+        a, b = (low[i] - m[:, i]) / sd, (high[i] - m[:, i]) / sd
+        log_p = log_mass(a, b)
+        total += np.where(there, log_p, 0.0)
+        log_a, log_b = -0.5 * (a**2 + np.log(2.0 * np.pi)) - log_p, -0.5 * (b**2 + np.log(2.0 * np.pi)) - log_p
+        pdf_a, pdf_b = np.exp(np.minimum(log_a, 50.0)), np.exp(np.minimum(log_b, 50.0))
+        shift = pdf_a - pdf_b
+        a_pdf, b_pdf = (np.where(pdf > 0.0, np.clip(x, -1e3, 1e3) * pdf, 0.0) for x, pdf in ((a, pdf_a), (b, pdf_b)))
+        narrower = np.clip(1.0 + a_pdf - b_pdf - shift**2, 1e-6, 1.0)
+        column = V[:, :, i] / sd[:, None] * there[:, None]
+        m = m + column * shift[:, None]
+        V = V - column[:, :, None] * column[:, None, :] * (1.0 - narrower)[:, None, None]
+    return total
+
+
+def evidence(
+    prediction: Prediction,
+    columns: Array,
+    at: Array,
+    faults: Sequence[Parameter],
+    causes: Sequence[Sequence[Parameter]],
+    law_error: LawError,
+    shares: Sequence[float] = SHARES,
+) -> Evidence:
+    """Integrate the likelihood over sizes, subsets of faults and the law error.
+
+    Parameters
+    ----------
+    prediction : Prediction
+        At the fitted point.
+    columns : array, shape (d, n_faults + n_parameters)
+        Of t, per unit, at the fitted point.
+    at : array, shape (n_faults + n_parameters,)
+        The fitted point, less neutral.
+    causes : sequence of sequences of Parameters
+        Those of each cause; all of a cause are there, with sizes of one width.
+    """
+    parameters = [*faults, *(p for cause in causes for p in cause)]
+    subsets, log_prior, P = _slabs(faults, causes)
+    low, high = (np.array([getattr(p, end) - p.neutral for p in parameters]) for end in ("low", "high"))
+    far = 1e6 * (1.0 + np.abs(at))
+    low, high = np.maximum(low, -far), np.minimum(high, far)
+    b = columns @ at - prediction.mean  # = J u + noise
+    found, means, variances = [], [], []
+    for share in shares:
+        C = prediction.covariance + law_error.covariance(share)
+        L = cholesky(C, lower=True)
+        A, y = (solve_triangular(L, x, lower=True) for x in (columns, b))
+        SA = P[:, :, None] * (A.T @ A) * P[:, None, :]
+        M = np.linalg.inv(SA + np.eye(len(parameters)))
+        V = P[:, :, None] * M * P[:, None, :]
+        mean = V @ (A.T @ y)
+        _, logdet = np.linalg.slogdet(SA + np.eye(len(parameters)))
+        constant = -0.5 * len(y) * np.log(2.0 * np.pi) - np.log(np.diag(L)).sum()
+        gaussian = constant - 0.5 * (float(y @ y) - mean @ (A.T @ y)) - 0.5 * logdet
+        prior_mass = np.where(P > 0.0, log_mass(low / np.where(P > 0, P, 1.0), high / np.where(P > 0, P, 1.0)), 0.0)
+        inside = log_box(mean, V, low, high) - prior_mass.sum(axis=1)
+        rest = prediction.log_rest(law_error.of_rest(share))
+        found.append(gaussian + inside + log_prior + rest - np.log(len(shares)))
+        means.append(np.clip(mean, low, high))
+        variances.append(np.diagonal(V, axis1=1, axis2=2))
+    log_z = np.concatenate(found)
+    total = float(logsumexp(log_z))
+    weight = np.exp(log_z - total)
+    u, var = np.concatenate(means), np.concatenate(variances)
+    expected = weight @ u
+    sd = np.sqrt(np.maximum(weight @ (var + u**2) - expected**2, 0.0))
+    there = np.tile(subsets, (len(shares), 1))
+    return Evidence(total, weight @ there, expected, sd)
+
+
+def _slabs(faults: Sequence[Parameter], causes: Sequence[Sequence[Parameter]]) -> tuple[Array, Array, Array]:
+    """Subsets of faults (n, n_faults), log prior (n,), standard deviations of all parameters (n, p) by term."""
+    subsets, log_prior, P = [], [], []
+    usual = np.array([p.usual for p in faults])
+    for there in product((0.0, 1.0), repeat=len(faults)):
+        any_fault = any(there)
+        for fault_width, *widths in product(
+            range(len(WIDTHS)) if any_fault else (0,), *([range(len(WIDTHS))] * len(causes))
+        ):
+            weight = np.log(WEIGHTS[fault_width]) if any_fault else 0.0
+            weight += sum(np.log(WEIGHTS[w]) for w in widths)
+            n = sum(there)
+            weight += n * np.log(FAULT) + (len(faults) - n) * np.log1p(-FAULT)
+            sizes = [WIDTHS[w] * p.usual for w, cause in zip(widths, causes, strict=True) for p in cause]
+            subsets.append(there)
+            log_prior.append(weight)
+            P.append([*(WIDTHS[fault_width] * usual * there), *sizes])
+    return np.array(subsets), np.array(log_prior), np.array(P)

@@ -1,0 +1,152 @@
+"""From features to a few statistics: whitening, projection on what candidates can move, and the rest as one number."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.stats import gamma
+
+from .hypothesis import Array, Block
+from .records import Simulated
+
+RECORDS_PER_DIRECTION = 3  # simulated records for each statistic whose covariance they tell
+FAINT = 1e-2  # length of a direction over the longest, below which no candidate moves it apart from others
+
+
+def shrinkage(z: Array) -> float:
+    """Weight of the diagonal in the estimate of a correlation matrix from standardised rows z (n, d).
+
+    λ = Σ Var(r_ij) / Σ r_ij²  over i ≠ j  (Schäfer and Strimmer, Stat. Appl. Genet. Mol. Biol. 4, 2005).
+    """
+    n, d = z.shape
+    if d == 1:
+        return 0.0
+    r = z.T @ z / (n - 1)
+    second = (z**2).T @ (z**2) / (n - 1)
+    variance = (second - r**2) / n
+    off = ~np.eye(d, dtype=bool)
+    return float(np.clip(variance[off].sum() / max((r[off] ** 2).sum(), 1e-300), 0.02, 1.0))
+
+
+def shrunk_correlation(z: Array) -> Array:
+    """Correlation matrix of standardised rows z (n, d), positive definite however few they are."""
+    r = (1.0 - shrinkage(z)) * (z.T @ z / len(z))
+    np.fill_diagonal(r, 1.0)
+    return np.asarray(r)
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """Standard deviations (n_features,) and the factor of each kind of block; made of the runs of `seeds`."""
+
+    sd: Array
+    factors: dict[int, Array]
+    blocks: tuple[Block, ...]
+    seeds: range
+
+    @classmethod
+    def of(cls, records: Simulated, blocks: Sequence[Block], floors: Array) -> Whitening:
+        """From simulated records; blocks of one kind have one noise."""
+        away = records.features - records.features.mean(axis=0)
+        away *= np.sqrt(len(away) / (len(away) - 1.0))
+        sd, factors = np.empty_like(floors), {}
+        for kind in sorted({block.kind for block in blocks}):
+            same = [block.at for block in blocks if block.kind == kind]
+            x = np.concatenate([away[:, at] for at in same])
+            of = np.sqrt((x**2).mean(axis=0) + floors[same[0]] ** 2)
+            factors[kind] = cholesky(shrunk_correlation(x / of), lower=True, check_finite=False)
+            for at in same:
+                sd[at] = of
+        return cls(sd, factors, tuple(blocks), records.seeds)
+
+    def white(self, x: Array) -> Array:
+        """Rows (..., n_features) in units of noise."""
+        z = np.atleast_2d(x / self.sd)
+        out = np.empty_like(z)
+        for at, kind in self.blocks:
+            out[:, at] = solve_triangular(self.factors[kind], z[:, at].T, lower=True, check_finite=False).T
+        return np.asarray(out.reshape(np.shape(x)))
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """Projection of whitened features on the span of columns.
+
+    Attributes
+    ----------
+    whitening : Whitening
+    basis : array, shape (n_features, d)
+        Orthonormal.
+    """
+
+    whitening: Whitening
+    basis: Array
+
+    @classmethod
+    def of(cls, whitening: Whitening, columns: Array, n_records: int) -> Statistic:
+        """On the directions that whitened `columns` (n_features, n_columns) reach, strongest first.
+
+        No more than the covariance of `n_records` simulated records can be told for.
+        """
+        length = np.linalg.norm(columns, axis=0)
+        unit = columns[:, length > 0.0] / length[length > 0.0]
+        u, s, _ = np.linalg.svd(unit, full_matrices=False)
+        d = min(int((s > FAINT * s[0]).sum()), n_records // RECORDS_PER_DIRECTION) if len(s) else 0
+        return cls(whitening, u[:, :d])
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        """Statistics t (..., d) of features (..., n_features), and their squared rest (...)."""
+        white = self.whitening.white(x)
+        t = white @ self.basis
+        return t, np.maximum((white**2).sum(axis=-1) - (t**2).sum(axis=-1), 0.0)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a hypothesis foretells of the statistics of a record.
+
+    Attributes
+    ----------
+    mean : array, shape (d,)
+        Of t, less that of the record: the residual with its sign turned.
+    covariance : array, shape (d, d)
+        Of one record, with the share of a mean of N.
+    rest : float
+        Squared rest of the record about the predicted mean, less what the mean's own noise makes of it.
+    rest_mean, rest_variance : float
+        Of records of the hypothesis itself.
+    n_records : int
+        How many these were.
+    """
+
+    mean: Array
+    covariance: Array
+    rest: float
+    rest_mean: float
+    rest_variance: float
+    n_records: int
+
+    @classmethod
+    def of(cls, statistic: Statistic, records: Simulated, measured: Array) -> Prediction:
+        """From simulated records that the whitening has not seen; else OwnRecordsError."""
+        records.refuse_shared(statistic.whitening.seeds)
+        n = len(records.features)
+        unbiased = n / (n - 1.0)
+        centre = records.features.mean(axis=0)
+        t, own = statistic(records.features - centre)
+        mean, rest = statistic(centre - measured)
+        sd = np.sqrt(unbiased * (t**2).mean(axis=0))
+        covariance = shrunk_correlation(np.sqrt(unbiased) * t / sd) * np.outer(sd, sd)
+        rest_mean = unbiased * float(own.mean())
+        left = max(float(rest) - rest_mean / n, 1e-9)
+        rest_variance = unbiased**2 * float(own.var(ddof=1))
+        return cls(mean, (1.0 + 1.0 / n) * covariance, left, rest_mean, rest_variance, n)
+
+    def log_rest(self, law_error: float) -> float:
+        """Log density of the rest: a gamma as wide as the records', stretched by what a law may leave of it."""
+        stretch = 1.0 + law_error / self.rest_mean
+        scale = self.rest_variance / self.rest_mean
+        return float(gamma.logpdf(self.rest, self.rest_mean / scale, scale=scale * stretch))
