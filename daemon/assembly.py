@@ -15,9 +15,11 @@ from ema.bus.interface import open_bus
 from ema.log import LogSettings, LogWriter
 from ema.monitor import Monitor, Runner
 
+from .health import Health
 from .remote import RemoteRunner
 from .service import Service
 from .settings import DaemonSettings, load_bundles
+from .supervision import promised
 from .worker import Worker
 
 
@@ -34,7 +36,10 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     bundles = load_bundles(settings)
     monitor = Monitor(bundles, codec, settings.monitor)
     local = Runner(bundles).run
-    remote = {method: RemoteRunner(path, bundles) for method, path in settings.remote.items()}
+    watch = settings.supervision
+    remote = {
+        method: RemoteRunner(path, bundles, patience=watch.budget(method)) for method, path in settings.remote.items()
+    }
     attachments: dict[str, bytes | Path] = {
         codec.path.name: codec.path,
         "daemon.yaml": yaml.safe_dump(settings.model_dump(mode="json"), allow_unicode=True, sort_keys=False).encode(),
@@ -47,10 +52,18 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
         for runner in remote.values():
             stack.callback(runner.close)
         workers = {
-            method: Worker(remote[method].run if method in remote else local, settings.queue, method)
+            method: (
+                Worker(remote[method].run, settings.queue, method, remote[method].probe)
+                if method in remote
+                else Worker(local, settings.queue, method)
+            )
             for method in settings.monitor.slower
         }
-        yield Service(monitor, port, log, codec, workers, settings.pace)
+        every = {method: slower.every for method, slower in settings.monitor.slower.items()}
+        supervisor = promised(bundles, every, remote, watch)
+        answering = {method: runner.answers for method, runner in remote.items()}
+        health = Health(monitor, port, log, supervisor, answering)
+        yield Service(monitor, port, log, codec, workers, settings.pace, health, watch)
 
 
 def _manifests(bundles: dict[int, Bundle]) -> dict[str, bytes]:

@@ -1,13 +1,17 @@
-"""The daemon's own state: counts, events made of what has been counted, and the heartbeat."""
+"""The daemon's own state: what it has counted, what does not happen, and the heartbeat made of both."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 
 from ema.bus.port import Port
-from ema.core.status import LogState, ServiceState
+from ema.core.status import IMPLAUSIBLE, BusState, Lapse, LogState, Reason, ServiceState, Status
 from ema.log import LogWriter
-from ema.monitor import Event, Level, Monitor
+from ema.monitor import FIRST, Event, Identified, Job, Level, Monitor
+from ema.monitor.supervision import Promise, Supervisor
+
+from .supervision import estimate_of, event, worker_of
 
 # Counts whose growth means that data are missing or bad, and how an event says it.
 _TROUBLE = {
@@ -21,64 +25,139 @@ _TROUBLE = {
     "kernel_drops": "dropped by the kernel (receive buffer full)",
 }
 _HARMLESS = {"n_repeated", "n_reordered"}  # noted, but no data are missing
+_SHOWS = {  # which promises of an actuator a good frame of its shows to be kept
+    "CycleStart": Lapse.NO_CYCLES,
+    "CycleEnd": Lapse.NO_CYCLES,
+    "PhaseCurrents": Lapse.NO_CURRENTS,
+    "Motion": Lapse.NO_MOTION,
+    "Supply": Lapse.NO_SUPPLY,
+}
+_NOBODY = 255  # Heartbeat.concerned
 _MIB = 1 << 20
 
 
 @dataclass
 class Health:
-    """Looked at once in a heartbeat."""
+    """What the loop tells it, and what it sees itself: `look` often, `beat` once in a heartbeat.
+
+    Attributes
+    ----------
+    answering : mapping of method to callable
+        Whether the process that runs a remote identifier answers.
+    """
 
     monitor: Monitor
     port: Port
     log: LogWriter
+    supervisor: Supervisor
+    answering: Mapping[str, Callable[[], bool]] = field(default_factory=dict)
     n_skipped: int = 0  # jobs no worker had time for
     n_failed: int = 0  # jobs that ended in an error
-    latency_ns: int = 0  # longest from a cycle's last frame to its linear estimate on the bus, since the last look
+    n_timeout: int = 0  # times that something expected of an actuator did not come
+    latency: float = 0.0  # longest from a cycle's last frame to its linear estimate on the bus, since the last beat [s]
     state: ServiceState = ServiceState.STARTING
     counters: dict[str, int] = field(default_factory=dict)
-    _log_state: LogState = LogState.OK
-    _silent: set[tuple[str, int]] = field(default_factory=set)
+    _heard: dict[tuple[int, str], int] = field(default_factory=dict)
 
-    def look(self, now_ns: int) -> list[Event]:
-        """Update counters and state; what has happened since the last look."""
-        silent = set(self.monitor.time_outs(now_ns))
+    def look(self, now: float, wall_ns: int) -> list[Event]:
+        """See what is kept of the promises at `now`, a monotonic time [s]; what has changed since the last look."""
+        table = self.supervisor
+        table.advance(now)
+        self._listen()
+        bus = self.port.bus_state
+        table.show(
+            {
+                Promise(Lapse.BUS_DOWN): bus is not BusState.DOWN,
+                Promise(Lapse.BUS_OFF): bus is not BusState.BUS_OFF,
+                Promise(Lapse.ERROR_PASSIVE): bus is not BusState.ERROR_PASSIVE,
+                Promise(Lapse.FLOODED): not self.port.flooded,
+                Promise(Lapse.LOG): self.log.state is LogState.OK,
+                **{worker_of(method): answers() for method, answers in self.answering.items()},
+            }
+        )
+        events = [Event(wall_ns, Level.WARNING, "link", line) for line in self.port.take_events()]
+        for change in table.look():
+            self.n_timeout += change.lapsed and change.promise.actuator is not None
+            detail = f": it is {self.log.state.name.lower()}" if change.promise.lapse is Lapse.LOG else ""
+            if told := event(change, wall_ns, detail):
+                events.append(told)
+        self.state = self._judge()
+        return events
+
+    def beat(self, wall_ns: int) -> list[Event]:
+        """Update the counters; what they tell of the time since the last beat."""
         before, self.counters = self.counters, self._count()
         grown = {name: self.counters[name] - before.get(name, 0) for name in _TROUBLE}
-        events = [
-            Event(now_ns, Level.WARNING, "time_out", f"{message} frames do not come", actuator)
-            for message, actuator in sorted(silent - self._silent)
-        ]
-        events += [
-            Event(now_ns, Level.INFO, "in_time", f"{message} frames come again", actuator)
-            for message, actuator in sorted(self._silent - silent)
-        ]
-        self._silent = silent
-        events += [Event(now_ns, Level.WARNING, "link", line) for line in self.port.take_events()]
-        if any(grown.values()):
-            text = ", ".join(f"{n} {_TROUBLE[name]}" for name, n in grown.items() if n > 0)
-            events.append(Event(now_ns, Level.WARNING, "frames", f"frames since the last heartbeat: {text}"))
-        if self.log.state is not self._log_state:
-            self._log_state = self.log.state
-            good = self._log_state is LogState.OK
-            level = Level.INFO if good else Level.ERROR
-            events.append(Event(now_ns, level, "log", f"log: {self._log_state.name.lower()}"))
         missing = any(n > 0 for name, n in grown.items() if name not in _HARMLESS)
-        sound = self._log_state is LogState.OK and not silent and not missing
-        self.state = ServiceState.RUNNING if sound else ServiceState.DEGRADED
-        self.latency_ns = 0
-        return events
+        self.supervisor.show({Promise(Lapse.FRAMES): not missing})
+        self.supervisor.look()
+        self.state = self._judge()
+        self.latency = 0.0
+        if not any(grown.values()):
+            return []
+        text = ", ".join(f"{n} {_TROUBLE[name]}" for name, n in grown.items() if n > 0)
+        return [Event(wall_ns, Level.WARNING, "frames", f"frames since the last heartbeat: {text}")]
+
+    def estimated(self, out: Identified, age: float) -> None:
+        """An estimate has been sent."""
+        e = out.estimate
+        usable = e.status <= Status.DEGRADED and not e.reasons & Reason.LATE
+        table, promise = self.supervisor, estimate_of(out.actuator, e.method)
+        if usable:
+            table.keep(promise)
+        elif e.reasons & Reason.LATE:
+            table.fail(promise)
+        if e.method == FIRST:
+            self.latency = max(self.latency, age)
+            table.show({Promise(Lapse.CHANNEL, out.actuator): not e.reasons & IMPLAUSIBLE})
+
+    def skipped(self, job: Job) -> None:
+        """A job was not done: its identifier is behind."""
+        self.n_skipped += 1
+        self.supervisor.fail(estimate_of(job.actuator, job.method))
+
+    def failed(self, job: Job) -> None:
+        """A job has ended in an error."""
+        self.n_failed += 1
+        self.supervisor.fail(estimate_of(job.actuator, job.method))
 
     def heartbeat(self, uptime: float) -> dict[str, int | float]:
         """Signals of the heartbeat frame."""
         sent = "n_cycles n_estimates n_lost n_repeated n_reordered n_crc_error n_wrong_counter n_wrong_length n_timeout"
         counts = {name: self.counters[name] for name in [*sent.split(), "n_foreign", "n_refused", "kernel_drops"]}
+        gravest = self.supervisor.gravest
         return {
             **counts,
             "state": int(self.state),
             "log_state": int(self.log.state),
             "log_free": self.log.free_bytes // _MIB,
             "uptime": int(uptime),
+            "reason": int(gravest.lapse if gravest else Lapse.NONE),
+            "concerned": _NOBODY if gravest is None or gravest.actuator is None else gravest.actuator,
         }
+
+    def supervision(self) -> dict[str, int]:
+        """Signals of the frame that says everything that does not happen."""
+        lapsed = self.supervisor.lapsed
+        return {
+            "reasons": _bits({promise.lapse for promise in lapsed}),
+            "concerned": _bits({promise.actuator for promise in lapsed if promise.actuator is not None}),
+            "watched": _bits(self.monitor.actuators),
+        }
+
+    def _listen(self) -> None:
+        """Whom has been heard since the last look."""
+        heard = self.monitor.heard
+        for (actuator, message), count in heard.items():
+            if count > self._heard.get((actuator, message), 0):
+                self.supervisor.keep(Promise(Lapse.SILENT, actuator))
+                self.supervisor.keep(Promise(_SHOWS[message], actuator))
+        self._heard = heard
+
+    def _judge(self) -> ServiceState:
+        if self.supervisor.lapsed:
+            return ServiceState.DEGRADED
+        return ServiceState.STARTING if self.supervisor.awaited else ServiceState.RUNNING
 
     def _count(self) -> dict[str, int]:
         port = self.port.counters
@@ -86,6 +165,7 @@ class Health:
             "n_cycles": self.monitor.n_cycles,
             "n_estimates": self.monitor.n_estimates,
             **asdict(self.monitor.counts),
+            "n_timeout": self.n_timeout,
             "kernel_drops": port.kernel_drops,
             "n_received": port.n_received,
             "n_sent": port.n_sent,
@@ -96,5 +176,9 @@ class Health:
             "n_not_logged": self.log.dropped,
             "n_skipped": self.n_skipped,
             "n_failed": self.n_failed,
-            "latency_us": self.latency_ns // 1000,
+            "latency_us": round(1e6 * self.latency),
         }
+
+
+def _bits(numbers: set[int] | set[Lapse] | frozenset[int]) -> int:
+    return sum(1 << int(number) for number in numbers)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Mapping
 from contextlib import suppress
 
@@ -13,6 +14,8 @@ from ema.monitor import Job
 from . import wire
 from .answer import unpack_answer
 from .wire import WireError, WrongAnswer
+
+_PROBE_TIMEOUT = 1.0  # [s]
 
 
 class RemoteRunner:
@@ -25,20 +28,33 @@ class RemoteRunner:
     bundles : mapping of actuator number to Bundle
     timeout : float
         For one answer. [s]
+    patience : float
+        So long after a question, a process that has not answered is said not to. [s]
     """
 
-    def __init__(self, path: str, bundles: Mapping[int, Bundle], timeout: float = 60.0):
-        self._path, self._bundles, self._timeout = path, bundles, timeout
+    def __init__(self, path: str, bundles: Mapping[int, Bundle], timeout: float = 60.0, patience: float = 60.0):
+        self._path, self._bundles, self._timeout, self._patience = path, bundles, timeout, patience
         self._socket: socket.socket | None = None
+        self._answered = True  # when asked last
+        self._asked: float | None = None  # since when an answer is waited for, monotonic [s]
+
+    def answers(self) -> bool:
+        """Whether the process answers, as far as is known: asked by another thread than that of the jobs."""
+        asked = self._asked
+        return self._answered and (asked is None or time.monotonic() - asked <= self._patience)
+
+    def probe(self) -> None:
+        """Find out whether the process answers; never raises."""
+        with suppress(OSError):
+            self._ask(wire.PROBE, _PROBE_TIMEOUT)
 
     def run(self, job: Job) -> Estimate:
         """The estimate a job asks for; WireError when there is none."""
         bundle = self._bundles[job.actuator]
         line = wire.pack_job(job, bundle)
         try:
-            answer = self._ask(line)
+            answer = self._ask(line, self._timeout)
         except OSError as error:
-            self.close()
             raise WireError(f"worker at {self._path} does not answer ({error.strerror or error})") from error
         try:
             return unpack_answer(answer, job, bundle)
@@ -46,11 +62,25 @@ class RemoteRunner:
             self.close()  # what comes next on this connection may be late as well
             raise
 
-    def _ask(self, line: bytes) -> bytes:
+    def _ask(self, line: bytes, timeout: float) -> bytes:
+        self._asked = time.monotonic()
+        try:
+            answer = self._exchanged(line, timeout)
+        except OSError:
+            self._answered = False
+            self.close()
+            raise
+        finally:
+            self._asked = None
+        self._answered = True
+        return answer
+
+    def _exchanged(self, line: bytes, timeout: float) -> bytes:
         if self._socket is None:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
-            self._socket.settimeout(self._timeout)
+            self._socket.settimeout(timeout)
             self._socket.connect(self._path)
+        self._socket.settimeout(timeout)
         self._socket.sendall(line)
         answer = bytearray()
         while not answer.endswith(b"\n"):

@@ -13,11 +13,25 @@ from ema.bus.port import MAX_BATCH, Port
 from ema.core.frames import joined, overflow_notice
 from ema.core.status import ServiceState
 from ema.log import LogWriter
-from ema.monitor import ARBITER, FIRST, Event, Identified, Job, Level, LostJob, Monitor, Output, SampledEnvelope
+from ema.monitor import (
+    ARBITER,
+    Event,
+    Identified,
+    Job,
+    Level,
+    LostJob,
+    Monitor,
+    Output,
+    SampledEnvelope,
+    Timeliness,
+    Verdict,
+)
 
+from .arrival import Arrival
 from .health import Health
 from .notify import notify
 from .sinks import BusSink, LogSink
+from .supervision import LOOK, SupervisionSettings
 from .worker import Worker
 
 BEAT = 1.0  # [s]
@@ -39,15 +53,26 @@ class Service:
     workers : mapping of identifier to Worker
     pace : float
         After a read that left nothing waiting, frames are collected for so long: fewer, larger batches cost less. [s]
+    health : Health
+    watch : SupervisionSettings
     """
 
     def __init__(
-        self, monitor: Monitor, port: Port, log: LogWriter, codec: Codec, workers: Mapping[str, Worker], pace: float
+        self,
+        monitor: Monitor,
+        port: Port,
+        log: LogWriter,
+        codec: Codec,
+        workers: Mapping[str, Worker],
+        pace: float,
+        health: Health,
+        watch: SupervisionSettings,
     ):
         self._monitor, self._port, self._log = monitor, port, log
         self._bus_sink, self._log_sink = BusSink(port, codec), LogSink(log)
         self._workers, self._pace = workers, pace
-        self._health = Health(monitor, port, log)
+        self._health = health
+        self._arrival, self._timeliness = Arrival(), Timeliness(watch.budget)
         self._drops = 0
         self._asked_ns = 0  # time of the cycle that the arbiter has been asked about for longest
         self._stuck = False
@@ -59,20 +84,24 @@ class Service:
 
     def run(self) -> None:
         """Run until stopped; then finish what is begun."""
-        started = next_beat = time.monotonic()
+        started = next_beat = next_look = time.monotonic()
         self._event(Level.INFO, "started", self._port.choice)
         gc.collect()
         gc.freeze()  # the garbage collector need not look through all that start-up has made, in the middle of a cycle
         notify("READY=1")
         while not self._stopping:
-            frames = self._port.read(min(_WAIT, max(0.0, next_beat - time.monotonic())))
+            frames = self._port.read(min(_WAIT, max(0.0, next_look - time.monotonic())))
             if frames.size:
                 self._ingest(frames)
             self._answer_jobs(self._workers.values())
             now = time.monotonic()
-            if now >= next_beat:
-                self._beat(now - started)
-                next_beat = max(next_beat + BEAT, now)
+            if now >= next_look:
+                changed = self._look(now)
+                next_look = max(next_look + LOOK, now)
+                if now >= next_beat or changed:
+                    self._beat(now - started)
+                if now >= next_beat:
+                    next_beat = max(next_beat + BEAT, now)
             if 0 < frames.size < MAX_BATCH // 2:
                 time.sleep(self._pace)
         notify("STOPPING=1")
@@ -82,6 +111,7 @@ class Service:
         if self._port.counters.kernel_drops != self._drops:
             self._drops = self._port.counters.kernel_drops
             frames = joined([overflow_notice(int(frames["t_ns"][0])), frames])
+        self._arrival.note(frames, time.time_ns(), time.monotonic())
         self._log.frames(frames, self._port.name)
         self._settle(int(frames["t_ns"][-1]))
         self._put(self._monitor.stream(frames))
@@ -105,28 +135,33 @@ class Service:
 
     def _put(self, outputs: Iterable[Output]) -> None:
         """Every estimate onto the bus as soon as it is there; when all are, the rest of the work."""
-        later = []
+        later: list[Output | Verdict] = []
         for out in outputs:
-            if isinstance(out, Identified):
-                self._bus_sink.estimate(out)
-                if out.estimate.method == FIRST:
-                    self._health.latency_ns = max(self._health.latency_ns, time.time_ns() - out.t_ns)
-            later.append(out)
-        for out in later:
-            if isinstance(out, Identified):
-                self._log_sink.estimate(out)
-            elif isinstance(out, SampledEnvelope):
-                self._log_sink.envelope(out)
-            elif isinstance(out, Event):
-                self._log_sink.event(out)
-            else:
-                self._submit(out)
+            later.append(self._send(out) if isinstance(out, Identified) else out)
+        for item in later:
+            if isinstance(item, Verdict):
+                self._log_sink.estimate(item.out, item.age)
+                if item.event:
+                    self._log_sink.event(item.event)
+            elif isinstance(item, SampledEnvelope):
+                self._log_sink.envelope(item)
+            elif isinstance(item, Event):
+                self._log_sink.event(item)
+            elif isinstance(item, Job):
+                self._submit(item)
+
+    def _send(self, out: Identified) -> Verdict:
+        verdict = self._timeliness.judge(out, self._arrival.of(out.actuator, out.t_ns), time.monotonic())
+        if verdict.to_bus:
+            self._bus_sink.estimate(verdict.out, verdict.age)
+        self._health.estimated(verdict.out, verdict.age)
+        return verdict
 
     def _submit(self, job: Job) -> None:
         if job.method == ARBITER and self._workers[ARBITER].idle:
             self._asked_ns = job.t_ns
         if not self._workers[job.method].submit(job):
-            self._health.n_skipped += 1
+            self._health.skipped(job)
             text = f"{job.method}: cycle {job.cycle} is skipped, the worker is behind"
             self._log_sink.event(Event(job.t_ns, Level.WARNING, LostJob.SKIPPED, text, job.actuator))
 
@@ -138,29 +173,37 @@ class Service:
     def _conclude(self, answers: Iterable[tuple]) -> None:
         for job, answer in answers:
             if isinstance(answer, Exception):
-                self._health.n_failed += 1
+                self._health.failed(job)
                 text = f"{job.method}: cycle {job.cycle} failed: {' '.join(str(answer).split()) or repr(answer)}"
                 self._log_sink.event(Event(job.t_ns, Level.ERROR, LostJob.FAILED, text, job.actuator))
             else:
                 self._put(self._monitor.conclude(job, answer))
 
+    def _look(self, now: float) -> bool:
+        """Look at the promises; whether the state has changed, which is told at once."""
+        before = self._health.state
+        for event in self._health.look(now, time.time_ns()):
+            self._log_sink.event(event)
+        return self._health.state is not before
+
     def _beat(self, uptime: float) -> None:
         now_ns = time.time_ns()
-        for event in self._health.look(now_ns):
+        for event in self._health.beat(now_ns):
             self._log_sink.event(event)
         self._send_beat(uptime, now_ns)
         notify("WATCHDOG=1")
 
     def _send_beat(self, uptime: float, now_ns: int) -> None:
-        self._bus_sink.heartbeat(self._health.heartbeat(uptime), now_ns)
-        self._log_sink.status(self._health.state, uptime, self._health.counters, now_ns)
+        health = self._health
+        self._bus_sink.heartbeat(health.heartbeat(uptime), health.supervision(), now_ns)
+        self._log_sink.status(health.state, uptime, health.counters, health.supervisor.ordered, now_ns)
 
     def _finish(self, uptime: float) -> None:
         self._put(self._monitor.finish())
         deadline = time.monotonic() + _PATIENCE
         for worker in self._workers.values():
             self._conclude(worker.close(deadline))
-        self._health.look(time.time_ns())
+        self._health.beat(time.time_ns())
         self._health.state = ServiceState.STOPPING
         self._send_beat(uptime, time.time_ns())
         self._event(Level.INFO, "stopped", f"stopped after {uptime:.1f} s, {self._monitor.n_cycles} cycles")

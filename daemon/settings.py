@@ -22,6 +22,7 @@ from ema.models.actuator import Actuator
 from ema.monitor import MonitorSettings
 
 from .sinks import estimate_message
+from .supervision import SupervisionSettings
 
 LOCAL = ("linear", "lf2")  # identifiers that are small enough for the daemon's own process
 Number = Annotated[int, Field(ge=0, lt=N_ACTUATORS)]
@@ -50,6 +51,7 @@ class DaemonSettings(Settings):
     remote: dict[str, str] = Field(
         default_factory=dict, description="identifiers in a process of their own (`ema hf-worker`): its Unix socket"
     )
+    supervision: SupervisionSettings = SupervisionSettings()
     pace: float = quantity("s", "frames are collected for so long before they are looked at", 3e-3, ge=0, le=0.1)
     queue: int = Field(default=8, ge=1, le=1000, description="cycles that may wait for a slower identifier")
 

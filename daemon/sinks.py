@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from ema.core.status import ServiceState
 from ema.identification import NuisanceEstimate
 from ema.log import LogWriter, contents
 from ema.monitor import Event, Identified, Level, SampledEnvelope
+from ema.monitor.supervision import Promise
 
 logger = logging.getLogger("ema.daemon")
 _LEVELS = {Level.INFO: logging.INFO, Level.WARNING: logging.WARNING, Level.ERROR: logging.ERROR}
@@ -32,8 +34,8 @@ class BusSink:
         self._port, self._codec = port, codec
         self._sender = Sender()
 
-    def estimate(self, out: Identified) -> None:
-        """One frame for each estimate, at once."""
+    def estimate(self, out: Identified, age: float) -> None:
+        """One frame for each estimate, at once; `age` is that since the cycle's last sample. [s]"""
         e = out.estimate
         residual = contents.rms(e.residual)
         values = {
@@ -44,6 +46,7 @@ class BusSink:
             "reason": int(e.reasons),
             "p_value": np.nan_to_num(e.p_value, nan=0.0),
             "residual": _NO_LIMIT if residual is None else residual,
+            "age": age,
         }
         self._send(estimate_message(e.method), out.actuator, values, out.t_ns)
         if e.nuisance is not None:
@@ -65,9 +68,10 @@ class BusSink:
             }
             self._send("EstimateNuisance", out.actuator, values, out.t_ns)
 
-    def heartbeat(self, values: dict[str, Any], t_ns: int) -> None:
-        """The sign of life."""
+    def heartbeat(self, values: dict[str, Any], supervision: dict[str, Any], t_ns: int) -> None:
+        """The sign of life, and beside it everything that does not happen."""
         self._send("Heartbeat", 0, values, t_ns)
+        self._send("Supervision", 0, {name: np.uint64(bits) for name, bits in supervision.items()}, t_ns)
 
     def _send(self, name: str, actuator: int, values: dict[str, Any], t_ns: int) -> None:
         self._port.write(self._sender.protect(self._codec.encode(name, actuator, values, t_ns)))
@@ -79,9 +83,9 @@ class LogSink:
     def __init__(self, log: LogWriter):
         self._log = log
 
-    def estimate(self, out: Identified) -> None:
-        """One message for each estimate."""
-        self._log.estimate(contents.estimate(out.t_ns, out.actuator, out.cycle, out.estimate))
+    def estimate(self, out: Identified, age: float) -> None:
+        """One message for each estimate; `age` is that at its sending. [s]"""
+        self._log.estimate(contents.estimate(out.t_ns, out.actuator, out.cycle, out.estimate, age))
         for content in contents.nuisance(out.t_ns, out.actuator, out.cycle, out.estimate):
             self._log.nuisance(content)
 
@@ -96,7 +100,9 @@ class LogSink:
         logger.log(_LEVELS[event.level], "%s%s", whose, event.text)
         self._log.event(contents.event(event.t_ns, event.level.value, event.code, event.text, event.actuator))
 
-    def status(self, state: ServiceState, uptime: float, counters: dict[str, int], t_ns: int) -> None:
+    def status(
+        self, state: ServiceState, uptime: float, counters: dict[str, int], lapses: Iterable[Promise], t_ns: int
+    ) -> None:
         """A copy of the heartbeat."""
         log = self._log
-        self._log.status(contents.status(t_ns, state, uptime, log.state, log.free_bytes, counters))
+        self._log.status(contents.status(t_ns, state, uptime, log.state, log.free_bytes, counters, lapses))

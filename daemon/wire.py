@@ -17,6 +17,7 @@ from ema.identification import Measurement
 from ema.monitor import Job
 
 MAX_LINE = 1 << 20  # [B]
+PROBE = b'{"probe": true}\n'  # no job, so the answer is that it is none: whoever gives one is alive
 
 
 class WireError(Exception):

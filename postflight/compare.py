@@ -29,7 +29,7 @@ class Pair(NamedTuple):
     @property
     def equal(self) -> bool:
         """Whether both are there and equal to the last bit."""
-        return self.logged is not None and self.logged == self.again
+        return self.logged is not None and self.again is not None and _said(self.logged) == _said(self.again)
 
     @property
     def difference(self) -> np.ndarray:
@@ -122,6 +122,11 @@ class Comparison:
         pair = Pair(*key[:3], sides.get("logged"), sides.get("again"))
         self.totals.setdefault((pair.actuator, pair.method), Totals()).add(pair)
         self._on_pair(pair)
+
+
+def _said(content: Content) -> Content:
+    """What an estimate says; its age is that of its sending, which is not repeated."""
+    return {name: value for name, value in content.items() if name != "age"}
 
 
 def _k(content: Content | None) -> np.ndarray:

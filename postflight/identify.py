@@ -25,13 +25,16 @@ from ema.monitor import (
     Output,
     Runner,
     SampledEnvelope,
+    Untimely,
     answered,
+    marked_late,
 )
 from ema.monitor.recorded import configuration, monitor_settings
 
 from .open_log import names
 from .received import Log, received, received_beside, worth_a_process
 
+_Key = tuple[int, int | None, str]  # t_ns, actuator, method
 _LOOK_AT = 20_000  # frames of a log without configuration, to see whose they are
 
 
@@ -112,23 +115,38 @@ def identified(
     """
     beside = worth_a_process(log) if n_processes is None else n_processes > 1
     monitor, runner = Monitor(how.bundles, codecs.default(), how.settings), Runner(how.bundles)
-    left_out = _left_out(log) if isinstance(log, LogReader) else set()
+    told = _told(log) if isinstance(log, LogReader) else {}
+    left_out = {key for key, codes in told.items() if codes & set(LostJob)}
     for item in (received_beside if beside else received)(log, how.bundles, how.settings, channels):
         if isinstance(item, Message):
             yield item
         else:
             outputs = (o for o in monitor.judge([item]) if not (isinstance(o, Job) and _job(o) in left_out))
-            yield from map(_encoded, answered(outputs, monitor, runner))
+            yield from (_encoded(_as_sent(out, told)) for out in answered(outputs, monitor, runner))
 
 
-def _job(job: Job) -> tuple[int, int | None, str]:
+def _job(job: Job) -> _Key:
     return job.t_ns, job.actuator, job.method
 
 
-def _left_out(log: LogReader) -> set[tuple[int, int | None, str]]:
-    """Jobs that a slower identifier, being behind, did not do: what they would have changed, the daemon never knew."""
-    events = (message.content for message in log.messages(lambda topic: topic == schemas.EVENT.topic))
-    return {(e["t_ns"], e["actuator"], e["text"].partition(":")[0]) for e in events if e.get("code") in set(LostJob)}
+def _told(log: LogReader) -> dict[_Key, set[str]]:
+    """What the daemon decided by its clock, which a replay has not: jobs not done, and estimates that came too late.
+
+    What jobs not done would have changed, the daemon never knew.
+    """
+    told: dict[_Key, set[str]] = {}
+    for message in log.messages(lambda topic: topic == schemas.EVENT.topic):
+        event = message.content
+        if event.get("code") in {*LostJob, *Untimely}:
+            method = event["text"].partition(":")[0]
+            told.setdefault((event["t_ns"], event["actuator"], method), set()).add(event["code"])
+    return told
+
+
+def _as_sent(out: Output, told: dict[_Key, set[str]]) -> Output:
+    if isinstance(out, Identified) and told.get((out.t_ns, out.actuator, out.estimate.method), set()) & set(Untimely):
+        return marked_late(out)
+    return out
 
 
 def _encoded(answer: Output) -> Encoded:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ema.core.closing import Closing
 from ema.core.frames import FrameFlag
+from ema.core.status import BusState
 
 MAX_BATCH = 512  # frames read at once
 RECEIVE_BUFFER = 8 << 20  # asked for; the kernel doubles it: 22 000 CAN FD frames, 3 s of six actuators [B]
@@ -43,12 +44,17 @@ class Port(Closing):
     choice : str
         One line for people: what was opened and why.
     counters : PortCounters
+    bus_state : BusState
+    flooded : bool
+        Whether others sent more than was looked at when the port was read last.
     """
 
     def __init__(self, name: str):
         self.name = name
         self.choice = name
         self.counters = PortCounters()
+        self.bus_state = BusState.ACTIVE
+        self.flooded = False
         self._events: list[str] = []
 
     @abstractmethod

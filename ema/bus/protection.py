@@ -110,6 +110,7 @@ class Receiver:
                 stream.counts.n_good += 1
                 stream.last_ns = t_ns
             else:
+                stream.begin_anew_after_silence(t_ns)
                 if t_ns - self._last_heard(frame_id) > RESTART_NS:
                     self._begin_anew(self._siblings(frame_id))
                 n_restarts = stream.n_restarts
@@ -120,9 +121,10 @@ class Receiver:
                     stream.last_ns = t_ns
         return np.frombuffer(checks, np.uint8)
 
-    def time_outs(self, now_ns: int) -> list[int]:
-        """Identifiers whose stream had a frame due and did not get it by `now_ns`."""
-        return [frame_id for frame_id, stream in self.streams.items() if stream.time_out(now_ns)]
+    @property
+    def heard(self) -> dict[int, int]:
+        """Good frames so far, by identifier."""
+        return {frame_id: stream.counts.n_good for frame_id, stream in self.streams.items()}
 
     @property
     def counts(self) -> Counts:

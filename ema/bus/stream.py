@@ -41,7 +41,6 @@ class Counts:
     n_wrong_counter: int = 0
     n_crc_error: int = 0
     n_wrong_length: int = 0
-    n_timeout: int = 0
     n_foreign: int = 0
     n_refused: int = 0
 
@@ -93,19 +92,16 @@ class Stream:
         self._update(Result.OK if check <= GOOD else Result.OTHER)
         return check
 
-    def time_out(self, now_ns: int) -> bool:
-        """Whether nothing came in time; counts it, once for each time-out that passes.
+    def begin_anew_after_silence(self, t_ns: int) -> None:
+        """See whether the frame received at `t_ns` ends a silence: by the frames' own times, in replay as live.
 
         The stream then begins anew with whatever comes: a sender that was restarted counts from its beginning.
         """
-        if not self.timeout_ns or now_ns - self.last_ns <= self.timeout_ns:
-            return False
-        self.last_ns = now_ns
-        self.counts.n_timeout += 1
+        if not self.timeout_ns or self.expected < 0 or t_ns - self.last_ns <= self.timeout_ns:
+            return
         self.machine.time_out()
         self.steady = False
         self.expected = -1
-        return True
 
     def _judge(self, sequence: int, t_ns: int) -> Check:
         counts = self.counts

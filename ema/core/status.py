@@ -33,11 +33,33 @@ class Reason(IntFlag):
     AUTHENTICATION = 1 << 13  # frames in this actuator's name were refused as not authentic
     KERNEL_DROPS = 1 << 14
     OUT_OF_RANGE = 1 << 15  # outside the range the model was built for
+    LATE = 1 << 16  # sent after its budget, or after one of a newer cycle
+    CURRENT_A = 1 << 17  # from here on: the channel reads what the actuator cannot do, so nothing is made of it
+    CURRENT_B = 1 << 18
+    CURRENT_C = 1 << 19
+    CURRENT_SUM = 1 << 20  # the phases of a wye sum to zero, and these do not; which one is wrong is not known
+    USER_POSITION = 1 << 21
+    ROTOR_ANGLE = 1 << 22
 
     @property
     def names(self) -> list[str]:
         """Names of the bits set, in order of the bits, lower case."""
         return [reason.name.lower() for reason in self if reason.name]
+
+
+IMPLAUSIBLE = (
+    Reason.CURRENT_A | Reason.CURRENT_B | Reason.CURRENT_C | Reason.CURRENT_SUM | Reason.USER_POSITION
+    | Reason.ROTOR_ANGLE
+)  # fmt: skip
+
+
+class BusState(IntEnum):
+    """State of a bus as its controller or interface tells it."""
+
+    ACTIVE = 0
+    ERROR_PASSIVE = 1  # many errors: the controller may no longer mark them for others
+    BUS_OFF = 2  # so many that it takes no part
+    DOWN = 3  # the interface is down or gone
 
 
 class ServiceState(IntEnum):
@@ -47,6 +69,28 @@ class ServiceState(IntEnum):
     RUNNING = 1
     DEGRADED = 2
     STOPPING = 3
+    STANDBY = 4  # listens and logs; another monitor speaks
+
+
+class Lapse(IntEnum):
+    """What the configuration promises and does not happen, the gravest first. Numbers as in the heartbeat."""
+
+    NONE = 0
+    BUS_DOWN = 1  # the interface is down or gone
+    BUS_OFF = 2
+    ERROR_PASSIVE = 3
+    FLOODED = 4  # more frames of others than this process can look at
+    LOG = 5  # not written
+    WORKER = 6  # the process of an identifier does not answer
+    SECOND_MONITOR = 7  # another one estimates the faults of the same actuator
+    SILENT = 8  # an actuator is not heard at all
+    NO_CYCLES = 9  # … sends neither CycleStart nor CycleEnd
+    NO_CURRENTS = 10
+    NO_MOTION = 11
+    NO_SUPPLY = 12
+    CHANNEL = 13  # … sends what it cannot do: a dead sensor
+    NO_ESTIMATE = 14  # an identifier has no usable estimate
+    FRAMES = 15  # frames were missing or refused since the last heartbeat
 
 
 class LogState(IntEnum):

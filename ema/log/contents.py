@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
 import numpy as np
 
-from ema.core.status import LogState, Reason, ServiceState, Status
+from ema.core.status import Lapse, LogState, Reason, ServiceState, Status
 
 
 class NuisanceLike(Protocol):
@@ -46,8 +46,11 @@ class EstimateLike(Protocol):
     def nuisance(self) -> NuisanceLike | None: ...  # noqa: D102
 
 
-def estimate(t_ns: int, actuator: int, cycle: int, result: EstimateLike) -> dict[str, Any]:
-    """Content of `schemas.ESTIMATE`; `t_ns` is the time of the cycle's last frame, so that replay gives the same."""
+def estimate(t_ns: int, actuator: int, cycle: int, result: EstimateLike, age: float | None = None) -> dict[str, Any]:
+    """Content of `schemas.ESTIMATE`; `t_ns` is the time of the cycle's last frame, so that replay gives the same.
+
+    `age` is that at the sending [s]; a replay sends nothing.
+    """
     return {
         "t_ns": int(t_ns),
         "actuator": int(actuator),
@@ -59,6 +62,7 @@ def estimate(t_ns: int, actuator: int, cycle: int, result: EstimateLike) -> dict
         "sd": result.sd.tolist(),
         "p_value": float(result.p_value),
         "residual": rms(result.residual),
+        "age": age,
     }
 
 
@@ -113,14 +117,24 @@ def event(t_ns: int, level: str, code: str, text: str, actuator: int | None = No
 
 
 def status(
-    t_ns: int, state: ServiceState, uptime: float, log_state: LogState, log_free: float, counters: Mapping[str, int]
+    t_ns: int,
+    state: ServiceState,
+    uptime: float,
+    log_state: LogState,
+    log_free: float,
+    counters: Mapping[str, int],
+    lapses: Iterable[tuple[Lapse, int | None, str]] = (),
 ) -> dict[str, Any]:
-    """Content of `schemas.STATUS`; `uptime` [s], `log_free` [B]."""
+    """Content of `schemas.STATUS`; `uptime` [s], `log_free` [B], `lapses`: what, of which actuator, of which method."""
     return {
         "t_ns": int(t_ns),
         "state": ServiceState(state).name.lower(),
         "uptime": float(uptime),
         "log_state": LogState(log_state).name.lower(),
         "log_free": float(log_free),
+        "lapses": [
+            {"reason": lapse.name.lower(), "actuator": actuator, "subject": subject}
+            for lapse, actuator, subject in lapses
+        ],
         "counters": {name: int(count) for name, count in counters.items()},
     }

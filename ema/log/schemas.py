@@ -10,7 +10,7 @@ import json
 from typing import Any, NamedTuple
 
 from ema.core.names import FAULTS
-from ema.core.status import LogState, Reason, ServiceState, Status
+from ema.core.status import Lapse, LogState, Reason, ServiceState, Status
 
 METHODS = ("linear", "lf2", "hf")  # identifiers that the daemon runs
 ACTUATORS = 64
@@ -120,6 +120,9 @@ ESTIMATE = Kind(
         "sd": _list(f"standard deviations of k, {_ORDER}", _VALUE, len(FAULTS)),
         "p_value": _or_null(_number("probability of a larger residual if the model holds", minimum=0, maximum=1)),
         "residual": _or_null(_number("root mean square of measured less modelled envelope [A]", minimum=0)),
+        "age": _or_null(
+            _number("from the cycle's last sample to the sending [s], null where nothing was sent", minimum=0)
+        ),
     },
 )
 
@@ -180,6 +183,19 @@ STATUS = Kind(
         "uptime": _number("time since the start [s]", minimum=0),
         "log_state": _choice("state of the log", [s.name.lower() for s in LogState]),
         "log_free": _number("free space of the log's file system [B]", minimum=0),
+        "lapses": _list(
+            "what the configuration promises and does not happen, the gravest first",
+            {
+                "type": "object",
+                "properties": {
+                    "reason": _choice("what", [lapse.name.lower() for lapse in Lapse if lapse]),
+                    "actuator": _or_null(_ACTUATOR),
+                    "subject": {"type": "string", "description": "identifier, where it is of one"},
+                },
+                "required": ["reason", "actuator", "subject"],
+                "additionalProperties": False,
+            },
+        ),
         "counters": {
             "type": "object",
             "description": "counts since the start: frames and cycles seen, estimated, lost, repeated, corrupt …",

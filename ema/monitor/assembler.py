@@ -67,8 +67,8 @@ class Assembler:
         self._waiting: list[_Batch] = []
         self._n_waiting = 0
         self._chirp = codec.number("CycleStart", "motion_kind", "chirp")
-        ids = {name: codec.messages[name].frame_id for name in RECEIVED}
-        self._start, self._end, self._currents, self._motion, _ = ids.values()
+        self._ids = {name: codec.messages[name].frame_id for name in RECEIVED}
+        self._start, self._end, self._currents, self._motion, _ = self._ids.values()
         timeout_ns, grace_ns = round(settings.timeout * 1e9), round(settings.grace * 1e9)
         self._assemblies = {
             number: Assembly(codec, number, plant.n_samples, timeout_ns, grace_ns) for number, plant in plants.items()
@@ -97,10 +97,11 @@ class Assembler:
             for cycle in assembly.finish():
                 yield from self._closed(assembly, cycle)
 
-    def time_outs(self, now_ns: int) -> list[tuple[str, int]]:
+    @property
+    def heard(self) -> dict[tuple[int, str], int]:
         """See Monitor."""
-        late = self.receiver.time_outs(now_ns)
-        return [(self._codec.find(i).name, identifiers.actuator(i)) for i in late]  # type: ignore[union-attr]
+        names = {message_id: name for name, message_id in self._ids.items()}
+        return {(identifiers.actuator(i), names[identifiers.message_id(i)]): n for i, n in self.receiver.heard.items()}
 
     def _gathered(self, batch: _Batch) -> _Batch | None:
         """The frames that wait to be placed, once there is a reason to: placing a few costs as much as placing many.

@@ -69,9 +69,15 @@ class Monitor:
         """What happened to frames since the start."""
         return self._reception.counts
 
-    def time_outs(self, now_ns: int) -> list[tuple[str, int]]:
-        """Messages that are sent at a period and did not come in time, with their actuators; each told once."""
-        return self._reception.time_outs(now_ns)
+    @property
+    def actuators(self) -> frozenset[int]:
+        """Whose faults are estimated."""
+        return frozenset(self._channels)
+
+    @property
+    def heard(self) -> dict[tuple[int, str], int]:
+        """Good frames since the start, by actuator and message."""
+        return self._reception.heard
 
     def update(self, frames: np.ndarray) -> list[Output]:
         """Take frames in the order they were received, shape (n,), FRAME_DTYPE; in batches of any size."""

@@ -40,9 +40,10 @@ class Reception:
         """What happened to frames since the start."""
         return self._assembler.receiver.counts
 
-    def time_outs(self, now_ns: int) -> list[tuple[str, int]]:
+    @property
+    def heard(self) -> dict[tuple[int, str], int]:
         """See Monitor."""
-        return self._assembler.time_outs(now_ns)
+        return self._assembler.heard
 
     def feed(self, frames: np.ndarray) -> Iterator[Job | Event]:
         """Take frames in the order they were received, shape (n,): cycles as jobs for FIRST, and what was odd."""

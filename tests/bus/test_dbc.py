@@ -12,7 +12,7 @@ from ema.bus.header import HEADER_SIGNALS
 from ema.bus.span import SAMPLES_PER_FRAME, Span
 from ema.core import resources
 from ema.core.names import METHODS
-from ema.core.status import LogState, Reason, ServiceState, Status
+from ema.core.status import Lapse, LogState, Reason, ServiceState, Status
 from ema.effects import registry
 from ema.log import schemas
 
@@ -75,6 +75,8 @@ def test_heartbeat_states_are_those_of_the_library(database):
     heartbeat = database.get_message_by_name("Heartbeat")
     assert choices(heartbeat, "state") == meaning(ServiceState)
     assert choices(heartbeat, "log_state") == meaning(LogState)
+    assert choices(heartbeat, "reason") == meaning(Lapse)
+    assert len(Lapse) <= database.get_message_by_name("Supervision").get_signal_by_name("reasons").length
 
 
 def test_a_cycle_has_the_layout_that_its_span_counts_with(database):

@@ -6,5 +6,6 @@ def test_reasons_are_named_in_the_order_of_their_bits():
     assert Reason(0).names == []
 
 
-def test_reasons_fit_a_sixteen_bit_field():
-    assert sum(Reason) == 0xFFFF
+def test_reasons_fit_their_thirty_two_bit_field():
+    assert sum(Reason) == (1 << len(Reason)) - 1
+    assert len(Reason) <= 32
