@@ -1,11 +1,12 @@
 # `make demo` and `make test` do everything themselves; `make check` is what CI runs before the tests.
 PYTHON ?= python3
 SERVICE_PYTHON ?= /usr/bin/python3
+HF     ?=
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test test-vcan test-systemd soak wheel install uninstall check env bench bench-discrepancy lock clean
+.PHONY: demo test test-vcan test-systemd soak wheel deb install uninstall check env bench bench-discrepancy lock clean
 
 demo: env
 	$(BIN)/ema demo --out out/demo
@@ -59,8 +60,12 @@ wheel: env
 	rm -rf build dist
 	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 
+# HF=--hf: with the HF worker beside the monitor, and the compiler it needs.
 install: wheel
-	PYTHON=$(SERVICE_PYTHON) tools/install_service install dist/*.whl
+	PYTHON=$(SERVICE_PYTHON) tools/install_service install dist/*.whl $(HF)
+
+deb: wheel
+	PYTHON=$(SERVICE_PYTHON) tools/build_deb dist/*.whl dist $(HF)
 
 uninstall:
 	tools/install_service uninstall

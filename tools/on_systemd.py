@@ -20,7 +20,7 @@ from platformdirs import user_cache_path
 sys.path.insert(0, str(Path(__file__).resolve().parent / "uml"))
 from machine import HERE, MachineError, boot, image, relay
 
-REQUIREMENTS = HERE.parents[1] / "requirements-run.lock"
+REQUIREMENTS = HERE.parents[1] / "requirements-hf.lock"
 INGREDIENTS = [HERE / "build_root", *sorted((HERE / "guest").iterdir()), REQUIREMENTS]
 MODULES = Path("/usr/lib/uml/modules")
 

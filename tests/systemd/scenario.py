@@ -32,6 +32,7 @@ def main():
     hang()
     take_the_interface_away()
     lock_the_bus()
+    package()
     facts["exposure"] = run("systemd-analyze", "security", "--no-pager", DAEMON, check=False).strip().splitlines()[-1]
     (JOB / "journal.txt").write_text(
         run("journalctl", "--no-pager", "-o", "short-monotonic", "-u", DAEMON, "-u", WORKER, "-u", SIMULATOR)
@@ -127,6 +128,39 @@ def lock_the_bus():
         scenario.write(f"bus: {{key_file: {key}}}\n")
     run("systemctl", "restart", SIMULATOR)
     facts["estimates_after_key"] = wait_for_estimates()
+
+
+def package():
+    say("the Debian package in place of the installed tree: install, upgrade, remove, install again")
+    run("systemctl", "disable", "--now", "--quiet", DAEMON)
+    # The tree stays for the simulator, which the monitor's package does not hold.
+    run("env", "PREFIX=/nothing/there", "sh", JOB / "install_service", "uninstall")
+    (deb,) = JOB.glob("*.deb")
+    mine = Path(f"/etc/ema/{BUS}.yaml").read_text()
+    run("dpkg", "--install", deb)
+    run("systemctl", "enable", "--now", "--quiet", DAEMON)
+    wait_until_running()
+    facts["estimates_after_package"] = wait_for_estimates()
+    facts["package_runs"] = os.readlink(f"/proc/{show('MainPID')['MainPID']}/exe"), executable()
+    before = show("MainPID")["MainPID"]
+    run("dpkg", "--install", deb)  # the same version again takes the way of an upgrade
+    wait("the new version runs", lambda: show("MainPID")["MainPID"] not in ("0", before))
+    wait_until_running()
+    facts["estimates_after_upgrade"] = wait_for_estimates()
+    run("dpkg", "--remove", "ema-monitor")
+    facts["removed"] = {
+        "left": [str(path) for path in (Path("/usr/lib/ema-monitor"), Path("/usr/bin/ema")) if os.path.lexists(path)],
+        "state": show("ActiveState")["ActiveState"],
+        "mine": Path(f"/etc/ema/{BUS}.yaml").read_text() == mine,
+        "logs": len(list(LOGS.glob("*.mcap"))),
+    }
+    run("dpkg", "--install", deb)
+    run("systemctl", "enable", "--now", "--quiet", DAEMON)
+    wait_until_running()
+
+
+def executable():
+    return Path(f"/proc/{show('MainPID')['MainPID']}/cmdline").read_bytes().split(b"\0")[1].decode()
 
 
 def journal():

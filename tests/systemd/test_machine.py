@@ -54,6 +54,8 @@ def machine(request, coarse_bundle, tmp_path_factory):
     shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns(".*", "build", "dist", "*.egg-info", "out", "var"))
     subprocess.run([*pip, "--wheel-dir", job, source], check=True)
     shutil.rmtree(source)
+    (wheel,) = job.glob("*.whl")
+    subprocess.run([ROOT / "tools/build_deb", wheel, job], check=True, stdout=subprocess.DEVNULL)
     words = [sys.executable, ROOT / "tools/on_systemd.py", "--timeout", "900", "--job", job, "python3", "scenario.py"]
     done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     (job / "transcript.txt").write_text(done.stdout)
@@ -113,9 +115,27 @@ def test_daemon_is_restarted(facts, machine, event, result):
     assert f"Failed with result '{result}'" in (machine / "journal.txt").read_text()
 
 
-@pytest.mark.parametrize("event", ["kill", "hang", "interface", "key"])
+@pytest.mark.parametrize("event", ["kill", "hang", "interface", "key", "package", "upgrade"])
 def test_estimates_go_on(facts, event):
     assert facts[f"estimates_after_{event}"] >= 2
+
+
+def test_the_package_runs_its_own_program_and_goes_without_a_trace_of_itself(facts):
+    assert facts["package_runs"][1].startswith("/usr/lib/ema-monitor/")
+    assert facts["removed"]["left"] == []
+    assert facts["removed"]["state"] in ("inactive", "failed")
+
+
+def test_a_removed_package_leaves_what_is_the_user_s(facts):
+    assert facts["removed"]["mine"]
+    assert facts["removed"]["logs"] >= 1
+
+
+def test_the_package_has_no_error_by_lintian(machine):
+    (deb,) = machine.glob("*.deb")
+    words = ["lintian", "--fail-on", "error", "--allow-root", "--tag-display-limit", "3", deb]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-3000:]
 
 
 def test_kill_opens_the_next_segment_and_loses_nothing_earlier(machine):

@@ -46,23 +46,6 @@ def test_unit_is_understood(unit, tmp_path):
     assert [line for line in complaints if not any(key in line for key in NEWER_THAN_DEBIAN_12)] == []
 
 
-def test_documented_steps_make_a_configuration_whose_files_are_there(tmp_path):
-    text = (ROOT / "docs/service.md").read_text()
-    steps = [line.strip() for line in text.splitlines() if line.startswith(("    cp ", "    sed "))]
-    assert len(steps) == 2
-    (tmp_path / "bundle").mkdir()
-    (tmp_path / "config").symlink_to(ROOT / "config")
-    etc = tmp_path / "etc"
-    etc.mkdir()
-    script = "\n".join(steps).replace("/etc/ema", str(etc))
-    subprocess.run(["sh", "-euc", script], cwd=tmp_path, check=True)
-    settings = load(etc / "vcan0.yaml")
-    assert Path(settings.actuators[0].bundle) == etc / "bundle"
-    assert Path(settings.actuators[0].bundle).is_dir()
-    assert Path(settings.actuators[0].plant).is_file()
-    assert settings.log.directory == "/var/log/ema/vcan0"
-
-
 @pytest.mark.slow
 def test_install_and_uninstall_below_destdir(tmp_path):
     stage, wheels = tmp_path / "stage", tmp_path / "wheels"
@@ -83,5 +66,22 @@ def test_install_and_uninstall_below_destdir(tmp_path):
     program = (stage / "opt/ema-monitor/bin/ema").read_text()
     assert program.startswith("#!/opt/ema-monitor/bin/python")
     assert str(stage) not in program
+    assert not list((stage / "opt/ema-monitor").rglob("site-packages/pip")), "the service never runs pip"
+    _documented_steps(stage / "etc/ema", tmp_path)
     subprocess.run([install, "uninstall"], env=environment, check=True, stdout=subprocess.DEVNULL)
-    assert [path for path in stage.rglob("*") if not path.is_dir()] == []
+    left = [path for path in stage.rglob("*") if not path.is_dir()]
+    assert {path.parent for path in left} == {stage / "etc/ema"}, "configurations are the user's, all else goes"
+
+
+def _documented_steps(etc, tmp_path):
+    """The steps of docs/service.md make a configuration of the example whose files are there."""
+    steps = [line.strip() for line in (ROOT / "docs/service.md").read_text().splitlines() if line.startswith("    cp ")]
+    assert len(steps) == 2
+    (tmp_path / "bundle").mkdir()
+    script = "\n".join(steps).replace("/etc/ema", str(etc))
+    subprocess.run(["sh", "-euc", script], cwd=tmp_path, check=True)
+    settings = load(etc / "vcan0.yaml")
+    assert Path(settings.actuators[0].bundle) == etc / "bundle"
+    assert Path(settings.actuators[0].bundle).is_dir()
+    assert Path(settings.actuators[0].plant).is_file()
+    assert settings.log.directory == "/var/log/ema/vcan0"
