@@ -10,6 +10,7 @@ STAMP  := $(VENV)/.installed
 
 demo: env
 	$(BIN)/ema demo --out out/demo
+	@echo "To type 'ema' yourself, once in each terminal: . $(BIN)/activate   (then: ema init tester work)"
 
 # Two processes: the search for hidden effects beside all that waits for clocks and sockets, which runs one by one.
 test: env

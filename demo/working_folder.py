@@ -45,7 +45,7 @@ ROLES = {
         "`ema watch` in a third terminal shows the bus; docs/tutorials/tester.md goes on.",
     ),
     "integrator": Role(
-        ("actuator.yaml", "builder-quick.yaml", "builder.yaml", "daemon.yaml"),
+        ("actuator.yaml", "builder-quick.yaml", "builder.yaml", "daemon.yaml", "report.yaml"),
         ("log",),
         (
             _BUILD,
