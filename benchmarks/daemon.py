@@ -1,10 +1,12 @@
 """The daemon as a process beside `ema simulate`: start-up, latency on the bus, frames lost, memory, processor.
 
-    python -m benchmarks.daemon [--bundle var/bundle] [--actuators 6] [--cycles 20]
+    python -m benchmarks.daemon [--bundle var/bundle] [--actuators 1 6] [--turns 16 64] [--cycles 20] [--first]
 
-Both on UDP multicast; a listener of its own hears them. Latency is from a cycle's CycleEnd, sent right behind its last
-currents, to its linear estimate, both by the kernel's receive time. It means little while others use the machine: the
-load average is printed beside. Processor time is that of the daemon while cycles are sent.
+Both on UDP multicast; a listener of its own hears them. The actuators of one run end their cycles in the same
+millisecond, or, of `--turns`, one after the other, as many of them do on several buses. Latency is from a cycle's
+CycleEnd, sent right behind its last currents, to its linear estimate, both by the kernel's receive time. It means little
+while others use the machine: the load average is printed beside; `--first` (as root) puts daemon, simulator and listener
+before all other processes. Processor time is that of the daemon while cycles are sent.
 """
 
 from __future__ import annotations
@@ -32,13 +34,29 @@ from .rig import EMA, Figures, figures
 
 SEED = 12
 N_CYCLES = 20
-_PATIENCE = 60.0  # for the start, and for the last estimates [s]
+TURN, ROUNDS = 0.25, 2  # of actuators that take turns: from one's cycle to the next one's [s], and cycles of each
+LATENCY = {1: 6.0, 6: 20.0}  # limits, by actuators in step [ms]
+MEMORY = 220.0  # limit, of any number of actuators [MB]
+_PATIENCE = 60.0  # for the start [s]
+PATIENCE_AFTER = 3.0  # for the last estimates, and a heartbeat behind them [s]
 
 
-def rows(bundle: Path | None = None, actuators: tuple[int, ...] = (1, 6), n_cycles: int = N_CYCLES) -> list[dict]:
-    """One run for each number of actuators, a test cycle a second, all at the same time."""
+def rows(
+    bundle: Path | None = None,
+    actuators: tuple[int, ...] = (1, 6),
+    n_cycles: int = N_CYCLES,
+    turns: tuple[int, ...] = (16, 64),
+) -> list[dict]:
+    """A run for each number of actuators: a test cycle a second, all at the same time; then those that take turns."""
     path = (bundle or quick_bundle().path).resolve()
-    return [row for n in actuators for row in _rows(_measured(path, n, n_cycles), n, n_cycles)]
+    found = []
+    for n in actuators:
+        whose = "one actuator" if n == 1 else f"{n} actuators in step"
+        found += _rows(_measured(path, n, n_cycles, {"period": 1.0}), whose, n, n_cycles)
+    for n in turns:
+        plan = {"stagger": TURN, "period": 1.0 + TURN * (n - 1)}
+        found += _rows(_measured(path, n, ROUNDS, plan), f"{n} actuators in turns", n, ROUNDS)
+    return found
 
 
 @dataclass
@@ -52,7 +70,7 @@ class _Seen:
     took: float  # [s]
 
 
-def _measured(bundle: Path, n_actuators: int, n_cycles: int) -> _Seen:
+def _measured(bundle: Path, n_actuators: int, n_cycles: int, plan: dict[str, float]) -> _Seen:
     pid = os.getpid()
     bus = {"interface": "udp_multicast", "channel": f"239.75.{pid % 250}.{pid // 250 % 250}"}
     with tempfile.TemporaryDirectory(prefix="ema-bench-") as name, open_bus(BusSettings(**bus)) as port:
@@ -60,7 +78,8 @@ def _measured(bundle: Path, n_actuators: int, n_cycles: int) -> _Seen:
         (folder / "log").mkdir()
         actuators = {n: {"bundle": str(bundle)} for n in range(n_actuators)}
         daemon = {"bus": bus, "actuators": actuators, "log": {"directory": "log"}}
-        scenario = {"bus": bus, "seed": SEED, "n_cycles": n_cycles, "actuators": [{"number": n} for n in actuators]}
+        who = [{"number": n} for n in actuators]
+        scenario = {"bus": bus, "seed": SEED, "n_cycles": n_cycles, "actuators": who, **plan}
         (folder / "daemon.yaml").write_text(yaml.safe_dump(daemon))
         (folder / "scenario.yaml").write_text(yaml.safe_dump(scenario))
         said, began = (folder / "said.txt").open("w"), time.monotonic()
@@ -77,7 +96,7 @@ def _measured(bundle: Path, n_actuators: int, n_cycles: int) -> _Seen:
                 while node.poll() is None:
                     heard.append(port.read(0.2))
                 after, took = figures(service.pid), time.monotonic() - then
-                heard += _listen(port, service, "Heartbeat", 3.0)
+                heard += _listen(port, service, "Heartbeat", PATIENCE_AFTER)
             finally:
                 node.kill()
                 node.wait()
@@ -102,7 +121,7 @@ def _listen(port: Port, service: subprocess.Popen[bytes], until: str, patience: 
     raise RuntimeError(f"no {until} within {patience:g} s")
 
 
-def _rows(seen: _Seen, n_actuators: int, n_cycles: int) -> list[dict[str, Any]]:
+def _rows(seen: _Seen, whose: str, n_actuators: int, n_cycles: int) -> list[dict[str, Any]]:
     codec = codecs.default()
     beat = codec.messages["Heartbeat"].decode(_of(seen.frames, codec, "Heartbeat"))
     latency = latencies(seen.frames, codec)
@@ -110,7 +129,6 @@ def _rows(seen: _Seen, n_actuators: int, n_cycles: int) -> list[dict[str, Any]]:
     load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
 
     def row(figure: str, value: float, unit: str, limit: float | None = None) -> dict[str, Any]:
-        whose = "one actuator" if n_actuators == 1 else f"{n_actuators} actuators in step"
         named = {"figure": f"{whose}: {figure}", "value": round(float(value), 3), "unit": unit}
         return {**named, "limit": limit, "peer": "", "peer_value": None, "seed": SEED}
 
@@ -120,9 +138,10 @@ def _rows(seen: _Seen, n_actuators: int, n_cycles: int) -> list[dict[str, Any]]:
         row("frames the kernel dropped", beat["kernel_drops"][-1], "1", 0),
         row("frames on the bus", seen.frames.size / seen.took, "1/s"),
         row(f"latency of the linear estimate, median ({load})", np.median(latency), "ms"),
-        row("latency of the linear estimate, 99 %", np.percentile(latency, 99), "ms", 10),
+        row("latency of the linear estimate, 99 %", np.percentile(latency, 99), "ms", LATENCY.get(n_actuators)),
+        row("latency of the linear estimate, most", latency.max(), "ms"),
         row("processor for each actuator", 100 * cpu / n_actuators, "% of a core", 10),
-        row(f"resident memory, {seen.after.n_threads} threads", seen.after.rss / 1e6, "MB", 200),
+        row(f"resident memory, {seen.after.n_threads} threads", seen.after.rss / 1e6, "MB", MEMORY),
         row("start to first heartbeat", seen.start_up, "s"),
     ]
 
@@ -147,8 +166,12 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--bundle", type=Path, help="folder written by `ema build`; default: a quick one, cached")
     parser.add_argument("--actuators", type=int, nargs="+", default=[1, 6])
+    parser.add_argument("--turns", type=int, nargs="*", default=[])
     parser.add_argument("--cycles", type=int, default=N_CYCLES)
+    parser.add_argument("--first", action="store_true", help="before all other processes; needs root")
     arguments = parser.parse_args()
-    for found in rows(arguments.bundle, tuple(arguments.actuators), arguments.cycles):
+    if arguments.first:
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))  # inherited by daemon and simulator
+    for found in rows(arguments.bundle, tuple(arguments.actuators), arguments.cycles, tuple(arguments.turns)):
         limit = "" if found["limit"] is None else f"   (at most {found['limit']})"
         print(f"{found['figure']:75} {found['value']:10} {found['unit']}{limit}")

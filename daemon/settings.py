@@ -94,12 +94,17 @@ def load(path: Path) -> DaemonSettings:
 
 
 def load_bundles(settings: DaemonSettings) -> dict[int, Bundle]:
-    """The bundle of each actuator; BundleError where it was made for another one."""
+    """The bundle of each actuator, one object for all whose contents are the same; BundleError where made for another."""
     loaded: dict[str, Bundle] = {}
+    distinct: list[Bundle] = []
     bundles = {}
     for number, one in settings.actuators.items():
-        bundle = loaded.setdefault(one.bundle, None) or load_bundle(one.bundle)  # type: ignore[arg-type]
-        loaded[one.bundle] = bundles[number] = bundle
+        if one.bundle not in loaded:
+            bundle = load_bundle(one.bundle)
+            alike = [other for other in distinct if other.manifest == bundle.manifest]  # hashes of the arrays included
+            distinct += [] if alike else [bundle]
+            loaded[one.bundle] = (*alike, bundle)[0]
+        bundle = bundles[number] = loaded[one.bundle]
         if one.plant is not None and config.digest(config.load(one.plant, Actuator)) != config.digest(bundle.plant):
             raise BundleError(
                 f"{one.bundle}: was made for actuator '{bundle.plant.name}' with other parameters than {one.plant}"

@@ -22,6 +22,7 @@ from ema.faults import N_FAULTS
 from ema.identification.known_error import KnownError, n_terms
 from ema.identification.noise import N_START, NoiseModel
 from ema.identification.nuisance import Nuisance
+from ema.identification.sampling import Sampler
 from ema.models.actuator import Actuator
 from ema.models.lf2 import Lf2
 
@@ -118,6 +119,11 @@ class Bundle:
         if not len(found):
             return found
         return found.seen(np.hstack([self.A, self.N]), self.arrays["noise_switching"])
+
+    @cached_property
+    def sampler(self) -> Sampler:
+        """Takes measurements at the schedule; one for all actuators of this bundle."""
+        return Sampler(self.plant, self.schedule)
 
     def lf2(self) -> Lf2:
         """The LF2 library over the whole cycle."""

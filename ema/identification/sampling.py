@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ema import faults
 from ema.models.actuator import Actuator
@@ -15,6 +16,7 @@ from .measurement import Measurement
 # patterns of 1…90 ms lost: up to this share the error of the envelope is 0.001 A rms, a sixth of the switching noise;
 # above, 0.002…0.008 A.
 MAX_MISSING_SHARE = 0.02
+_NO_WEIGHT = 1e-9  # share of a sample in a scheduled point below which it is not kept: thousands of them are nothing
 
 
 class Sampler:
@@ -34,7 +36,8 @@ class Sampler:
         unit = np.zeros((len(schedule), plant.n_samples))
         unit[np.arange(len(schedule)), schedule] = 1.0
         weight = np.abs(smoothed(unit, self._rate))
-        self._weight = weight / weight.sum(axis=1, keepdims=True)
+        weight /= weight.sum(axis=1, keepdims=True)
+        self._weight = csr_array(np.where(weight < _NO_WEIGHT, 0.0, weight))
         sensors = plant.sensors
         self._widest = float(faults.backlash(plant.transmission.b, np.array(1.0))) + sensors.lvdt_step
         self._full_scale = sensors.adc_range * (1.0 - 2.0 / 2**sensors.adc_bits)

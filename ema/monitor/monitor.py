@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from ema.bus.protection import Counts
 from ema.core.errors import ConfigError
 from ema.core.names import FAULTS
 from ema.core.status import Reason, Status
-from ema.identification import METHODS, Estimate, identifier
+from ema.identification import METHODS, Estimate, Identifier, identifier
+from ema.identification.noise import NoiseModel
 
 from .doubt import ModelDoubt
 from .outputs import FIRST, Event, Identified, Job, Level, Output, SampledEnvelope
@@ -27,13 +29,19 @@ _DEGRADING = (
 )  # fmt: skip
 
 
+class _Shared(NamedTuple):
+    """What the actuators of one bundle have in common; none of it changes."""
+
+    t: np.ndarray  # of the schedule [s]
+    noise: NoiseModel
+    identifier: Identifier
+
+
 class _Channel:
     """What the monitor keeps of one actuator."""
 
-    def __init__(self, bundle: Bundle, settings: MonitorSettings):
-        self.t = bundle.t[bundle.schedule]
-        self.noise = bundle.noise(FIRST)
-        self.identifier = identifier(FIRST, bundle)
+    def __init__(self, shared: _Shared, settings: MonitorSettings):
+        self.shared = shared
         self.doubts = {method: ModelDoubt(settings.model_check) for method in (FIRST, *settings.slower)}
         self.unseparable = dict.fromkeys(self.doubts, 0)  # estimates until it is told again
         self.chosen = dict.fromkeys(settings.slower, -1)  # interval of the last cycle chosen
@@ -60,7 +68,8 @@ class Monitor:
             known = ", ".join(sorted(set(METHODS) - {FIRST}))
             raise ConfigError(f"monitor.slower: identifier '{unknown[0]}' is unknown; known: {known}")
         self._settings = settings
-        self._channels = {number: _Channel(bundle, settings) for number, bundle in bundles.items()}
+        shared = {id(b): _Shared(b.t[b.schedule], b.noise(FIRST), identifier(FIRST, b)) for b in bundles.values()}
+        self._channels = {number: _Channel(shared[id(bundle)], settings) for number, bundle in bundles.items()}
         self._reception = Reception(bundles, codec, settings)
         self.n_cycles = self.n_estimates = 0
 
@@ -105,7 +114,7 @@ class Monitor:
 
     def _answer(self, job: Job) -> Iterator[Output]:
         channel = self._channels[job.actuator]
-        estimate = channel.identifier.estimate(job.measurement)
+        estimate = channel.shared.identifier.estimate(job.measurement)
         outputs = list(self._concluded(job, estimate))
         self.n_cycles += 1
         usable = any(isinstance(o, Identified) and o.estimate.status <= Status.DEGRADED for o in outputs)
@@ -175,8 +184,10 @@ def _sampled(channel: _Channel, job: Job, estimate: Estimate) -> SampledEnvelope
     if np.isnan(estimate.k).any():
         sd = np.full(measured.shape, np.nan)
     else:
-        sd = np.sqrt(np.diag(channel.noise.covariance(job.measurement.start, estimate.k)))
-    return SampledEnvelope(job.t_ns, job.actuator, job.cycle, channel.t, measured, measured - estimate.residual, sd)
+        sd = np.sqrt(np.diag(channel.shared.noise.covariance(job.measurement.start, estimate.k)))
+    return SampledEnvelope(
+        job.t_ns, job.actuator, job.cycle, channel.shared.t, measured, measured - estimate.residual, sd
+    )
 
 
 def _unseparable(job: Job, estimate: Estimate) -> Event:

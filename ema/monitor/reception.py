@@ -13,7 +13,6 @@ from ema.bundle import Bundle
 from ema.bus.codec import Codec
 from ema.bus.protection import Counts
 from ema.core.status import Reason
-from ema.identification.sampling import Sampler
 
 from .assembler import Assembler
 from .cycles import AssembledCycle
@@ -32,7 +31,7 @@ class Reception:
     """
 
     def __init__(self, bundles: Mapping[int, Bundle], codec: Codec, settings: MonitorSettings):
-        self._samplers = {number: Sampler(bundle.plant, bundle.schedule) for number, bundle in bundles.items()}
+        self._samplers = {number: bundle.sampler for number, bundle in bundles.items()}
         self._assembler = Assembler(codec, {number: b.plant for number, b in bundles.items()}, settings)
 
     @property

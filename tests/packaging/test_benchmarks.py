@@ -14,7 +14,7 @@ from benchmarks.__main__ import _cells
 SMALLEST = {
     "bus": ({"ROUNDS": 1}, {}),
     "campaign": ({"N_RUNS": 32, "N_TASKS": 4}, {}),
-    "daemon": ({}, {"actuators": (1,), "n_cycles": 1}),
+    "daemon": ({}, {"actuators": (1,), "n_cycles": 1, "turns": ()}),
     "doubt": ({"FLIGHTS": 1, "CYCLES": 3, "EFFECTS": {}}, {}),
     "identification": ({"N": 2, "N_HF": 2, "N_INDEPENDENT": 2, "SETS": (0.05,)}, {}),
     "kernel": ({}, {}),
