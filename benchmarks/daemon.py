@@ -4,9 +4,9 @@
 
 Both on UDP multicast; a listener of its own hears them. The actuators of one run end their cycles in the same
 millisecond, or, of `--turns`, one after the other, as many of them do on several buses. Latency is from a cycle's
-CycleEnd, sent right behind its last currents, to its linear estimate, both by the kernel's receive time. It means little
-while others use the machine: the load average is printed beside; `--first` (as root) puts daemon, simulator and listener
-before all other processes. Processor time is that of the daemon while cycles are sent.
+CycleEnd, sent right behind its last currents, to its linear estimate, both by the kernel's receive time. It means
+little while others use the machine: the load average is printed beside; `--first` (as root) puts daemon, simulator and
+listener before all other processes. Processor time is that of the daemon while cycles are sent.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import sys
 import time
 from collections.abc import Iterable, Mapping
 
@@ -37,6 +38,9 @@ from .worker import Worker
 BEAT = 1.0  # [s]
 _WAIT = 0.05  # longest wait for frames, so that answers of workers and signals are seen [s]
 _CYCLES_APART_NS = 250_000_000  # cycles of one actuator end farther apart
+_LOOK_WAITS = 0.1  # at most so long, for a cycle's end [s]
+_PACES = 3  # so many of them before a cycle should end, frames are no longer collected: one asleep, the rest for jitter
+_SWITCH = 0.5e-3  # longest that another thread keeps the interpreter while this one wants it; Python's own is 5 ms [s]
 _STUCK = 1.0  # a worker that has not answered for so long is not waited for [s]
 _PATIENCE = 2.0  # for the workers at the end [s]
 
@@ -52,7 +56,8 @@ class Service:
     codec : Codec
     workers : mapping of identifier to Worker
     pace : float
-        After a read that left nothing waiting, frames are collected for so long: fewer, larger batches cost less. [s]
+        After a read that left nothing waiting, frames are collected for so long: fewer, larger batches cost less. Near
+        a cycle's end they are taken as they come, and all work that can wait does, so that its answer is early. [s]
     health : Health
     watch : SupervisionSettings
     """
@@ -73,6 +78,9 @@ class Service:
         self._workers, self._pace = workers, pace
         self._health = health
         self._arrival, self._timeliness = Arrival(), Timeliness(watch.budget)
+        self._near = _PACES * pace
+        self._later: list[Output | Verdict] = []  # answers of which the rest of the work is left to do
+        self._later_ns = 0  # time of the first of them
         self._drops = 0
         self._asked_ns = 0  # time of the cycle that the arbiter has been asked about for longest
         self._stuck = False
@@ -88,21 +96,26 @@ class Service:
         self._event(Level.INFO, "started", self._port.choice)
         gc.collect()
         gc.freeze()  # the garbage collector need not look through all that start-up has made, in the middle of a cycle
+        sys.setswitchinterval(_SWITCH)
         notify("READY=1")
         while not self._stopping:
             frames = self._port.read(min(_WAIT, max(0.0, next_look - time.monotonic())))
+            urgent = False
             if frames.size:
                 self._ingest(frames)
-            self._answer_jobs(self._workers.values())
+                urgent = self._monitor.ends_within(self._near)
+            if not urgent:
+                self._work_off()
+                self._answer_jobs(self._workers.values())
             now = time.monotonic()
-            if now >= next_look:
+            if now >= next_look + (_LOOK_WAITS if urgent else 0.0):
                 changed = self._look(now)
                 next_look = max(next_look + LOOK, now)
                 if now >= next_beat or changed:
                     self._beat(now - started)
                 if now >= next_beat:
                     next_beat = max(next_beat + BEAT, now)
-            if 0 < frames.size < MAX_BATCH // 2:
+            if 0 < frames.size < MAX_BATCH // 2 and not urgent:
                 time.sleep(self._pace)
         notify("STOPPING=1")
         self._finish(time.monotonic() - started)
@@ -121,6 +134,8 @@ class Service:
 
         On a live bus it is there long before; frames that come faster wait for it, but not for a worker that is stuck.
         """
+        if self._later and t_ns - self._later_ns >= _CYCLES_APART_NS:
+            self._work_off()
         worker = self._workers.get(ARBITER)
         if worker is None or worker.idle:
             self._stuck = False
@@ -134,10 +149,15 @@ class Service:
         self._stuck = not worker.idle
 
     def _put(self, outputs: Iterable[Output]) -> None:
-        """Every estimate onto the bus as soon as it is there; when all are, the rest of the work."""
-        later: list[Output | Verdict] = []
+        """Every estimate onto the bus as soon as it is there; the rest of the work is left for later."""
         for out in outputs:
-            later.append(self._send(out) if isinstance(out, Identified) else out)
+            if not self._later:
+                self._later_ns = out.t_ns
+            self._later.append(self._send(out) if isinstance(out, Identified) else out)
+
+    def _work_off(self) -> None:
+        """What is to be done with answers that are on the bus: log them, hand on their jobs."""
+        later, self._later = self._later, []
         for item in later:
             if isinstance(item, Verdict):
                 self._log_sink.estimate(item.out, item.age)
@@ -178,6 +198,7 @@ class Service:
                 self._log_sink.event(Event(job.t_ns, Level.ERROR, LostJob.FAILED, text, job.actuator))
             else:
                 self._put(self._monitor.conclude(job, answer))
+        self._work_off()
 
     def _look(self, now: float) -> bool:
         """Look at the promises; whether the state has changed, which is told at once."""
@@ -200,6 +221,7 @@ class Service:
 
     def _finish(self, uptime: float) -> None:
         self._put(self._monitor.finish())
+        self._work_off()
         deadline = time.monotonic() + _PATIENCE
         for worker in self._workers.values():
             self._conclude(worker.close(deadline))

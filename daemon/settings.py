@@ -94,7 +94,7 @@ def load(path: Path) -> DaemonSettings:
 
 
 def load_bundles(settings: DaemonSettings) -> dict[int, Bundle]:
-    """The bundle of each actuator, one object for all whose contents are the same; BundleError where made for another."""
+    """The bundle of each actuator, one object for those of the same contents; BundleError where made for another."""
     loaded: dict[str, Bundle] = {}
     distinct: list[Bundle] = []
     bundles = {}

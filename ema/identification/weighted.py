@@ -5,7 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dtrtrs  # bare: on thirty equations scipy's wrappers cost more than the work
+from scipy.linalg.lapack import (
+    dgeqrf,
+    dpotrf,
+    dtrtrs,
+)  # bare: on thirty equations scipy's wrappers cost more than the work
 from scipy.optimize import lsq_linear, nnls
 from scipy.special import chdtrc
 
@@ -33,9 +37,10 @@ class Solution(NamedTuple):
 
 def bounded_least_squares(A: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> Solution:
     """Minimise ‖b - A x‖² for low ≤ x ≤ high by QR; A (n, m) and b (n,) already whitened."""
-    Q, R = np.linalg.qr(A)
-    c = Q.T @ b
-    R_inverse = dtrtrs(R + np.diag(np.where(np.diag(R) == 0, 1e-12, 0.0)), np.eye(R.shape[1]))[0]
+    m = A.shape[1]
+    triangle = np.triu(dgeqrf(np.column_stack([A, b]))[0][:m])  # of [A b] = Q [R c; 0 ρ]: Qᵀb comes with it
+    R, c = triangle[:, :m], triangle[:, m]
+    R_inverse = dtrtrs(R + np.diag(np.where(np.diag(R) == 0, 1e-12, 0.0)), np.eye(m))[0]
     x = free = R_inverse @ c
     if (x < low).any() or (x > high).any():
         x = low + nnls(R, c - R @ low)[0]

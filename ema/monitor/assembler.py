@@ -97,6 +97,15 @@ class Assembler:
             for cycle in assembly.finish():
                 yield from self._closed(assembly, cycle)
 
+    def ends_within(self, duration: float) -> bool:
+        """See Monitor."""
+        for number, assembly in self._assemblies.items():
+            if assembly.open:
+                stream = self.receiver.streams.get(identifiers.with_actuator(self._currents, number))
+                if stream is not None and assembly.time_left(stream.expected) <= duration:
+                    return True
+        return False
+
     @property
     def heard(self) -> dict[tuple[int, str], int]:
         """See Monitor."""
@@ -150,8 +159,11 @@ class Assembler:
 
     def _first_due(self, batch: _Batch) -> tuple[Due | None, Assembly | None]:
         first: tuple[Due | None, Assembly | None] = (None, None)
-        open_ones = [assembly for assembly in self._assemblies.values() if assembly.open]
-        if not open_ones or not batch.frames.size:
+        if not batch.frames.size:
+            return first
+        latest_ns = int(batch.t_ns.max())
+        open_ones = [assembly for assembly in self._assemblies.values() if assembly.may_be_due(latest_ns)]
+        if not open_ones:
             return first
         currents = (batch.message == self._currents) & (batch.checks <= GOOD)
         numbers = sequence(batch.frames)
@@ -167,12 +179,11 @@ class Assembler:
         currents = batch.message == self._currents
         motions = (batch.message == self._motion) & (batch.checks <= GOOD)
         refused = batch.checks == Check.REFUSED
-        for number, assembly in self._assemblies.items():
-            own = batch.actuator == number
-            if own.any():
-                mine = own & currents
-                assembly.place(batch.frames[mine], batch.checks[mine], batch.frames[own & motions])
-                assembly.note_refused(int(np.count_nonzero(own & refused)))
+        for number in self._assemblies.keys() & set(batch.actuator.tolist()):
+            own, assembly = batch.actuator == number, self._assemblies[number]
+            mine = own & currents
+            assembly.place(batch.frames[mine], batch.checks[mine], batch.frames[own & motions])
+            assembly.note_refused(int(np.count_nonzero(own & refused)))
 
     def _mark(self, mark: _Batch) -> Iterator[AssembledCycle | Event]:
         """A good CycleStart or CycleEnd, or the notice that frames were dropped."""

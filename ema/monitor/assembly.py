@@ -70,6 +70,13 @@ class Assembly:
         """Whether a cycle is open."""
         return self._span is not None
 
+    def time_left(self, next_current: int) -> float:
+        """Until the open cycle's last currents come, when `next_current` is the sequence number of the next. [s]"""
+        if self._span is None:
+            return np.inf
+        n_left = (self._span.last_current + 1 - next_current) % N_SEQUENCES
+        return n_left * SAMPLES_PER_FRAME * self._span.period
+
     def place(self, currents: np.ndarray, checks: np.ndarray, motions: np.ndarray) -> None:
         """Take frames of PhaseCurrents with their checks, and good ones of Motion."""
         self._checks += np.bincount(checks, minlength=len(Check))
@@ -104,8 +111,6 @@ class Assembly:
             Their sequence numbers.
         """
         if self._span is None or not t_ns.size:
-            return None
-        if not self.may_be_due(int(t_ns.max())):
             return None
         latest = np.maximum.accumulate(np.where(own, t_ns, self._latest_ns))
         before = np.concatenate(([self._latest_ns], np.maximum(latest[:-1], self._latest_ns)))

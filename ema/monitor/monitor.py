@@ -83,6 +83,10 @@ class Monitor:
         """Whose faults are estimated."""
         return frozenset(self._channels)
 
+    def ends_within(self, duration: float) -> bool:
+        """Whether, by the currents that a cycle lacks, one ends so soon that its answer is to be ready for. [s]"""
+        return self._reception.ends_within(duration)
+
     @property
     def heard(self) -> dict[tuple[int, str], int]:
         """Good frames since the start, by actuator and message."""

@@ -39,6 +39,10 @@ class Reception:
         """What happened to frames since the start."""
         return self._assembler.receiver.counts
 
+    def ends_within(self, duration: float) -> bool:
+        """See Monitor."""
+        return self._assembler.ends_within(duration)
+
     @property
     def heard(self) -> dict[tuple[int, str], int]:
         """See Monitor."""
