@@ -7,9 +7,11 @@ datagrams of the same 72 bytes: the same system calls.
 from __future__ import annotations
 
 import socket
+import tempfile
 import threading
 import time
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import can
@@ -20,12 +22,15 @@ from ema_simulator.scenario import Scenario
 from ema_simulator.traffic import Traffic
 
 from ema.bus import mmsg
-from ema.bus.authentication import Sealer, Verifier
 from ema.bus.codec import Codec
-from ema.bus.load import frame_time, load
+from ema.bus.keys import Keyring
+from ema.bus.load import frame_time, load, sealed
 from ema.bus.port import RECEIVE_BUFFER, ask_for_buffer
 from ema.bus.protection import Receiver, Sender
+from ema.bus.sealer import Sealer
+from ema.bus.sessions import Sessions
 from ema.bus.socketcan import SocketCanPort
+from ema.bus.verifier import Verifier
 from ema.core import can_messages, config, resources
 from ema.core.errors import BusError
 from ema.core.frames import FrameFlag, joined
@@ -125,8 +130,19 @@ def rows() -> list[dict[str, Any]]:
         row(f"bus of 1 and 5 Mbit/s, {what}: its load ({100 * n * one[1]:.0f} % with all stuff bits)",
             100 * n * one[0], limit, unit="%")  # fmt: skip
     row("frame out: sequence and CRC", _median(lambda: _protect(frames)))
-    for what, n_forged in (("", 0), (", two forged ones beside each", 2)):
-        row(f"frame verified, message authentication{what}", _median(lambda n=n_forged: _verify(frames, n, codec)))
+    sealed_own = sealed(own, codec)
+    one = load(sealed_own, 1e6, 5e6), load(sealed_own, 1e6, 5e6, worst=True)
+    for what, n in (("one actuator", 1), ("six in turns, two at once", 2), ("six at once", 6)):
+        name = f"bus of 1 and 5 Mbit/s, {what}, authenticated: its load ({100 * n * one[1]:.0f} % with all stuff bits)"
+        row(name, 100 * n * one[0], unit="%")
+    with ExitStack() as stack:
+        link = _Link(stack)
+        costs = _median_each(lambda: _authenticated(frames, codec, link))
+    row("authentication: frame out, sealed", costs[0])
+    row(f"authentication: genuine frame in, its seals included ({link.name})", costs[1])
+    row(f"authentication: forged frame in, half of them seals: receive, verify, check ({link.name})", costs[3], 30.0)
+    row("authentication: MACs computed for each received frame", costs[2], 1.0, unit="")
+    row("authentication: MACs computed for each forged frame", costs[4], 1.0, unit="")
     return found
 
 
@@ -177,24 +193,72 @@ def _check(before: np.ndarray, frames: np.ndarray, size: int, codec: Codec) -> f
     return (time.process_time() - begin) / frames.size * 1e6
 
 
-def _verify(frames: np.ndarray, n_forged: int, codec: Codec) -> float:
-    """Time for each genuine frame, seals included; forged ones have its number, so that each costs a MAC as well."""
-    key, on_bus = bytes(16), []
-    sealer, verifier = Sealer(codec, key), Verifier(codec, key)
-    for n in range(frames.size):
-        forged = np.repeat(frames[n : n + 1], n_forged)
-        forged["data"][:, 5] ^= 1
-        t_ns = int(frames["t_ns"][n])
-        seals = sealer.add(frames[n : n + 1], t_ns)
-        seals["t_ns"] = t_ns
-        on_bus += [forged, frames[n : n + 1], seals]
-    batches = _batches(joined(on_bus), LIVE)
+def _sealed(frames: np.ndarray, codec: Codec, folder: Path) -> tuple[float, list[np.ndarray], Verifier]:
+    """Time to seal a frame, each frame with the seals it leads to, and a receiver that knows the senders."""
+    ring = Keyring({None: [bytes(16)]})
+    sealer, verifier = Sealer(codec, ring, Sessions(folder / "session")), Verifier(codec, ring)
+    verifier.feed(sealer.add(frames), 0)
+    verifier.feed(sealer.hear(verifier.ask(0), 0), 0)
     begin = time.process_time()
-    n_passed = sum(int(((verifier.feed(part, 0)["flags"] & REFUSED) == 0).sum()) for part in batches)
+    seals = [sealer.add(frames[n : n + 1]) for n in range(frames.size)]
     took = time.process_time() - begin
-    if n_passed != frames.size:
-        raise RuntimeError(f"{n_passed} of {frames.size} frames are found genuine")
-    return took / frames.size * 1e6
+    for n, made in enumerate(seals):
+        made["t_ns"] = frames["t_ns"][n]
+    return took / frames.size * 1e6, [joined([frames[n : n + 1], made]) for n, made in enumerate(seals)], verifier
+
+
+def _authenticated(frames: np.ndarray, codec: Codec, link: _Link) -> list[float]:
+    """What authentication costs: sealing, verifying a genuine frame, its share of trials, and a forged one all in.
+
+    Forged frames have the number of a genuine one, so that each is tried when that one's seal comes; forged seals claim
+    a session to come. Half are of either kind.
+    """
+    n_forged = 4
+    with tempfile.TemporaryDirectory(prefix="ema-bench-") as folder:
+        sealing, genuine, verifier = _sealed(frames, codec, Path(folder))
+    alone, _, n_trials = _verified(joined(genuine), frames.size, codec, link, verifier)
+    with tempfile.TemporaryDirectory(prefix="ema-bench-") as folder:
+        _, genuine, verifier = _sealed(frames, codec, Path(folder))
+    seals = [part[1:] for part in genuine if part.size > 1]
+    on_bus = []
+    for n, part in enumerate(genuine):
+        other = np.repeat(part[:1], n_forged // 2)
+        other["data"][:, 5] ^= 1 + np.arange(other.size, dtype=np.uint8)
+        claim = np.repeat(seals[n % len(seals)][:1], n_forged // 2)
+        claim["data"][:, 8] = 0x80 + np.arange(claim.size)
+        claim["t_ns"] = part["t_ns"][0]
+        on_bus += [other, claim, part]
+    every = joined(on_bus)
+    together, _, n_with = _verified(every, frames.size, codec, link, verifier)
+    n_more = n_forged * frames.size
+    return [
+        sealing,
+        alone / frames.size,
+        n_with / every.size,
+        (together - alone) / n_more,
+        (n_with - n_trials) / n_more,
+    ]
+
+
+def _verified(
+    frames: np.ndarray, n_genuine: int, codec: Codec, link: _Link, verifier: Verifier
+) -> tuple[float, int, int]:
+    """Time to receive, verify and check frames [µs], how many were genuine, and MACs computed."""
+    receiver, n_passed, taken, before = Receiver(codec), 0, 0.0, verifier.n_trials
+    for batch in _batches(frames, LIVE):
+        link.put(batch)
+        begin = time.process_time()
+        received = link.take()
+        taken += time.process_time() - begin
+        received["t_ns"] = batch["t_ns"]
+        begin = time.process_time()
+        decided = verifier.feed(received, 0)
+        receiver.check(decided)
+        taken += time.process_time() - begin
+        n_passed += int(((decided["flags"] & REFUSED) == 0).sum())
+    if n_passed != n_genuine:
+        raise RuntimeError(f"{n_passed} of {n_genuine} frames are found genuine")
+    return taken * 1e6, n_passed, verifier.n_trials - before
 
 
 def _protect(frames: np.ndarray) -> float:

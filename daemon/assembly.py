@@ -48,7 +48,7 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     log_settings = LogSettings(**settings.log.model_dump(exclude={"directory"}))
     with ExitStack() as stack:
         log = stack.enter_context(LogWriter(settings.log.directory, attachments, log_settings))
-        port = stack.enter_context(open_bus(settings.bus, codec.filters("Actuator")))
+        port = stack.enter_context(open_bus(settings.bus, codec.filters("Actuator"), role="Monitor"))
         for runner in remote.values():
             stack.callback(runner.close)
         workers = {

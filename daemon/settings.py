@@ -89,7 +89,10 @@ def load(path: Path) -> DaemonSettings:
     }
     log = settings.log.model_copy(update={"directory": str(folder / settings.log.directory)})
     remote = {method: str(folder / socket) for method, socket in settings.remote.items()}
-    bus = settings.bus.model_copy(update={"key_file": settings.bus.key_file and folder / settings.bus.key_file})
+    key_file, session_file = settings.bus.key_file, settings.bus.session_file
+    bus = settings.bus.model_copy(
+        update={"key_file": key_file and folder / key_file, "session_file": session_file and folder / session_file}
+    )
     return settings.model_copy(update={"bus": bus, "actuators": actuators, "log": log, "remote": remote})
 
 

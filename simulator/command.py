@@ -107,7 +107,7 @@ def _to_bus(scenario: Any, plant: Any, on_cycle: Any) -> None:
     def say(line: str) -> None:
         click.echo(line, err=True)
 
-    with open_bus(scenario.bus, codec.default().filters("Tester")) as port:
+    with open_bus(scenario.bus, codec.default().filters("Tester"), role="Actuator") as port:
         say(port.choice)
         done = run(scenario, plant, port, codec.default(), stop, on_cycle=on_cycle, say=say)
     say(

@@ -12,8 +12,7 @@ from pydantic import Field
 from ema.core.config import Settings
 from ema.core.errors import BusError
 
-from .authenticated import AuthenticatedPort
-from .authentication import load_key
+from .authenticated import AuthenticatedPort, challenges, session_file_of
 from .codec import default
 from .multicast import GROUP, MulticastPort
 from .port import Filters, Port
@@ -29,13 +28,15 @@ class BusSettings(Settings):
     """Where a program meets the others.
 
     `interface` is ``auto`` or an interface of python-can (``socketcan``, ``udp_multicast``, ``virtual``, ``pcan`` …);
-    `options` are passed to that interface as they are. With a `key_file` every frame is authenticated, in and out.
+    `options` are passed to that interface as they are. With a `key_file` every frame is authenticated, in and out; what
+    must outlive the process for that, a number, is in `session_file`, by default beside the key file.
     """
 
     interface: str = AUTO
     channel: str = ""
     options: dict[str, Any] = Field(default_factory=dict)
     key_file: Path | None = None
+    session_file: Path | None = None
 
 
 def parse(text: str) -> BusSettings:
@@ -54,18 +55,28 @@ def elsewhere(settings: BusSettings, text: str) -> BusSettings:
     """The same bus at another place (see `parse`): with its key, and its options where they fit."""
     place = parse(text)
     options = settings.options if place.interface == settings.interface else {}
-    return place.model_copy(update={"key_file": settings.key_file, "options": options})
+    return place.model_copy(update={"options": options, **settings.model_dump(include={"key_file", "session_file"})})
 
 
-def open_bus(settings: BusSettings, filters: Filters | None = None) -> Port:
+def open_bus(settings: BusSettings, filters: Filters | None = None, role: str = "Tester") -> Port:
     """Open the bus; its `choice` says what was taken and why. BusError when it cannot be opened.
 
     With `filters` only extended identifiers that agree with one of them are received (see `Codec.filters`); on a real
-    CAN interface the kernel leaves out the rest before it costs anything.
+    CAN interface the kernel leaves out the rest before it costs anything. `role` is who this is, a sender of the DBC:
+    where frames are authenticated, others are asked in its name.
     """
-    key = None if settings.key_file is None else load_key(settings.key_file)
+    key_file = settings.key_file
+    if key_file is not None and filters is not None:
+        filters = [*filters, *challenges(default())]
     port = _open(settings, filters) if settings.interface != AUTO else _open_best(settings, filters)
-    return port if key is None else AuthenticatedPort(port, default(), key)
+    if key_file is None:
+        return port
+    try:
+        session_file = settings.session_file or session_file_of(key_file)
+        return AuthenticatedPort(port, default(), key_file, session_file, role)
+    except BusError:
+        port.close()
+        raise
 
 
 def _open_best(settings: BusSettings, filters: Filters | None) -> Port:

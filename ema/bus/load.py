@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from .codec import Message
+from .codec import Codec, Message
+from .nodes import Kinds
+from .sealer import seal_period
 
 _ARBITRATION = 36  # start of frame to bit-rate switch
 _END = 13  # CRC delimiter, acknowledgement, end of frame, intermission
@@ -36,3 +38,10 @@ def frame_time(length: int, nominal: float, data: float, *, worst: bool = False)
 def load(messages: Iterable[Message], nominal: float, data: float, *, worst: bool = False) -> float:
     """Share of the bus that periodic messages take while they are sent, 1 is all of it."""
     return sum(frame_time(m.length, nominal, data, worst=worst) / m.period for m in messages if m.period)
+
+
+def sealed(messages: Iterable[Message], codec: Codec) -> list[Message]:
+    """Periodic messages with the seals that authentication sends for them."""
+    periodic = [m for m in messages if m.period]
+    kinds = Kinds(codec)
+    return periodic + [kinds.seal(m.sender)._replace(period=seal_period(m)) for m in periodic]

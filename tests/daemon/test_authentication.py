@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from e2e.p05 import e2e_p05_protect
 from ema_daemon.settings import load
+from sealed_bus import acquainted
 
 from ema.bus import codec as codecs
 from ema.bus import identifiers
-from ema.bus.authentication import Sealer, Verifier
 from ema.bus.header import sequence
 from ema.bus.interface import elsewhere
 from ema.core import frames as fr
@@ -17,7 +17,6 @@ from ema.monitor import Identified, Monitor
 from ema.monitor.settings import MonitorSettings
 
 CODEC = codecs.default()
-KEY = b"\x5a" * 16
 CURRENTS = CODEC.messages["PhaseCurrents"].frame_id
 
 
@@ -47,17 +46,22 @@ def with_forged(frames):
     return np.concatenate(out)
 
 
-def with_seals(frames):
-    sealer, out = Sealer(CODEC, KEY), []
+@pytest.fixture
+def ends(frames, tmp_path):
+    return acquainted(CODEC, frames[-1:], tmp_path)
+
+
+def with_seals(frames, ends):
+    sealer, out = ends[0], []
     for n in range(frames.size):
-        seals = sealer.add(frames[n : n + 1], int(frames["t_ns"][n]))
+        seals = sealer.add(frames[n : n + 1])
         seals["t_ns"] = frames["t_ns"][n]
         out += [frames[n : n + 1], seals]
     return np.concatenate(out)
 
 
-def let_through(frames):
-    verifier = Verifier(CODEC, KEY)
+def let_through(frames, ends):
+    verifier = ends[1]
     parts = [verifier.feed(part, int(part["t_ns"][-1])) for part in np.array_split(frames, 200)]
     return np.concatenate([*parts, verifier.feed(fr.empty(0), 2**63)])
 
@@ -66,9 +70,9 @@ def k(estimates):
     return np.array([estimate.k for estimate in estimates])
 
 
-def test_forged_currents_change_no_estimate_but_each_says_that_there_were_some(frames, estimates):
+def test_forged_currents_change_no_estimate_but_each_says_that_there_were_some(frames, estimates, ends):
     true, _ = estimates(frames)
-    found, counts = estimates(let_through(with_forged(with_seals(frames))))
+    found, counts = estimates(let_through(with_forged(with_seals(frames, ends)), ends))
     assert counts.n_refused == with_forged(frames).size - frames.size > 250
     assert counts.n_lost == 0
     assert np.array_equal(k(found), k(true))
@@ -76,8 +80,8 @@ def test_forged_currents_change_no_estimate_but_each_says_that_there_were_some(f
     assert all(e.status == max(t.status, Status.DEGRADED) for e, t in zip(found, true, strict=True))
 
 
-def test_refused_frames_are_evidence_in_the_log_and_replay_gives_the_same(frames, estimates, tmp_path):
-    passed = let_through(with_forged(with_seals(frames)))
+def test_refused_frames_are_evidence_in_the_log_and_replay_gives_the_same(frames, estimates, ends, tmp_path):
+    passed = let_through(with_forged(with_seals(frames, ends)), ends)
     with LogWriter(tmp_path) as log:
         log.frames(passed, "vcan0")
     with LogReader(tmp_path) as log:
@@ -89,8 +93,8 @@ def test_refused_frames_are_evidence_in_the_log_and_replay_gives_the_same(frames
     assert n_live == n_again
 
 
-def test_an_undisturbed_sealed_bus_says_nothing_of_it(frames, estimates):
-    found, counts = estimates(let_through(with_seals(frames)))
+def test_an_undisturbed_sealed_bus_says_nothing_of_it(frames, estimates, ends):
+    found, counts = estimates(let_through(with_seals(frames, ends), ends))
     assert counts.n_refused == 0
     assert not any(e.reasons & Reason.AUTHENTICATION for e in found)
 
@@ -102,8 +106,13 @@ def test_without_a_key_forged_frames_are_taken(frames, estimates):
 
 def test_another_bus_on_the_command_line_keeps_the_key(write_config, tmp_path):
     """The service is started with `--bus vcan0`: its key must not be forgotten by that."""
-    settings = load(write_config(bus={"interface": "socketcan", "key_file": "key", "options": {"receive_buffer": 9}}))
+    settings = load(
+        write_config(
+            bus={"interface": "socketcan", "key_file": "key", "session_file": "s", "options": {"receive_buffer": 9}}
+        )
+    )
     assert settings.bus.key_file == tmp_path / "key"
     same, other = elsewhere(settings.bus, "can1"), elsewhere(settings.bus, "virtual:x")
+    assert same.session_file == tmp_path / "s"
     assert (same.channel, same.key_file, same.options) == ("can1", tmp_path / "key", {"receive_buffer": 9})
     assert (other.interface, other.key_file, other.options) == ("virtual", tmp_path / "key", {})

@@ -18,7 +18,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ema.bus import codec as codecs
-from ema.bus.authentication import Verifier
+from ema.bus.keys import Keyring
+from ema.bus.verifier import Verifier
 from ema.core import config, resources
 from ema.core import frames as fr
 from ema.core.errors import ConfigError
@@ -128,7 +129,7 @@ def test_memory_does_not_grow_with_noise_on_the_bus(coarse_bundle, with_key):
     """Frames of every message and actuator with random contents; half of them pass the CRC as their sender's."""
     codec, rng = codecs.default(), np.random.default_rng(4)
     monitor = Monitor({0: coarse_bundle, 1: coarse_bundle}, codec, MonitorSettings())
-    verifier = Verifier(codec, bytes(16))
+    verifier = Verifier(codec, Keyring({None: [bytes(16)]}))
     ids = np.array([m.frame_id | n << 2 for m in codec.messages.values() for n in range(64)])
     lengths = np.array([m.length for m in codec.messages.values() for _ in range(64)])
 

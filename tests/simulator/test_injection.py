@@ -56,13 +56,22 @@ def test_on_a_bus_with_a_key_only_sealed_injections_are_obeyed(source, codec, tm
     key.chmod(0o600)
     place = parse("virtual:injection")
     locked, faults = place.model_copy(update={"key_file": key}), source("true")
-    with open_bus(locked, codec.filters("Tester")) as node, open_bus(place) as stranger, open_bus(locked) as tester:
+    filters = codec.filters("Tester")
+    with open_bus(locked, filters, "Actuator") as node, open_bus(place) as stranger, open_bus(locked) as tester:
+
+        def listen():
+            for _ in range(15):  # longer than a frame waits for its seal
+                faults.listen(node.read(0.01), t=1.0)
+
         stranger.write(control(codec, 2, TARGET, 0.0))
-        for _ in range(2):
-            faults.listen(node.read(0.1), t=1.0)
+        listen()
         assert (faults.n_injections, faults.n_refused) == (0, 1)
-        tester.write(control(codec, 2, TARGET, 0.0))
-        faults.listen(node.read(1.0), t=1.0)
-        faults.listen(node.read(0.1), t=1.0)
-        assert (faults.n_injections, faults.n_refused) == (1, 1)
+        out = Sender()
+        tester.write(out.protect(control(codec, 2, TARGET, 0.0)))
+        listen()  # does not know the tester, and asks
+        tester.read(0.1)
+        assert (faults.n_injections, faults.n_refused, tester.n_answers) == (0, 2, 1)
+        tester.write(out.protect(control(codec, 2, TARGET, 0.0)))
+        listen()
+        assert (faults.n_injections, faults.n_refused) == (1, 2)
         assert faults.at(2.0)[0] == pytest.approx(TARGET)
