@@ -7,6 +7,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from ema.core.version import version
+
+Verdict = Literal["adequate", "explained", "partly explained", "unexplained"]
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -20,7 +24,10 @@ class Quantity:
 
 @dataclass(frozen=True)
 class FoundEffect:
-    """A cause with what the data cannot tell from it, and the experiment that could."""
+    """A cause with what the data cannot tell from it, and the experiment that could.
+
+    `place` says where it acts: in the plant, in the control loop, or in the recorder alone.
+    """
 
     name: str
     confidence: float
@@ -28,6 +35,7 @@ class FoundEffect:
     parameters: dict[str, Quantity]
     sentence: str
     separated_by: str
+    place: Literal["plant", "loop", "recorder"] = "plant"
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,16 @@ class Gain:
     scale: float = 1e3
     unit: str = "mA"
 
+    @property
+    def rest(self) -> float:
+        """Error on held-out parts over what noise makes of it."""
+        return self.heldout_after / max(self.noise_floor, 1e-300)
+
+
+def graded(verdict: Literal["adequate", "explained", "unexplained"], gain: Gain) -> Verdict:
+    """The verdict, where causes that are named leave more than noise of what they were not fitted to."""
+    return "partly explained" if verdict == "explained" and gain.rest > EXPLAINED else verdict
+
 
 @dataclass(frozen=True)
 class Findings:
@@ -65,9 +83,14 @@ class Findings:
         Structure that is written into the extended plant without being a cause.
     rest : float
         What is left over noise, where that is told and it is more than noise; else 0.
+    rejected : list of dict
+        What was considered and is not the answer: its ``name``, what faults alone (``before``) and what it (``after``)
+        leaves of held-out parts over noise, and ``why``.
+    seeds : dict
+        Of the simulations that the answer rests on, where there are any.
     """
 
-    verdict: Literal["adequate", "explained", "unexplained"]
+    verdict: Verdict
     effects: list[FoundEffect]
     gain: Gain
     structure: dict[str, Any] = field(default_factory=dict)
@@ -77,6 +100,8 @@ class Findings:
     fitted: dict[str, Any] = field(default_factory=dict)
     unnamed: list[FoundEffect] = field(default_factory=list)
     rest: float = 0.0
+    rejected: list[dict[str, Any]] = field(default_factory=list)
+    seeds: dict[str, int] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """The content of findings.json."""
@@ -98,10 +123,13 @@ class Findings:
                 "false_alarms_before": g.false_alarms_before,
                 "false_alarms_after": g.false_alarms_after,
             },
+            "rejected": self.rejected,
             "tried": self.tried,
             "notes": self.notes,
             **({"rest": self.rest} if self.rest else {}),
             **({"records": self.records} if self.records else {}),
+            "version": version(),
+            "seeds": self.seeds,
         }
 
     def write(self, path: Path) -> None:
@@ -123,12 +151,16 @@ class Findings:
                 f"What is left is {self.rest:.3g} times the noise, not noise: a law has not quite the right form, or "
                 "something smaller is missing."
             )
+        if self.verdict == "partly explained":
+            left = f"That is not all: on held-out parts {self.gain.rest:.3g} times what noise makes is left"
+            said.append(left + ("; its structure: " + describe(self.structure) if self.structure else "") + ".")
         if self.verdict == "unexplained":
             said.append("No effect of the library explains the rest; its structure: " + describe(self.structure) + ".")
         return said
 
 
 SURE = 0.9
+EXPLAINED = 1.2  # times what noise makes of the error of held-out parts, beyond which a record is not explained
 SEEN = 1.05  # times the noise, where a rest beside a cause is worth a word
 
 

@@ -8,7 +8,9 @@ from ema_postflight.discrepancy import discrepancy
 
 from ema.core import resources
 from ema.core.errors import ConfigError
-from ema.discrepancy.findings import Findings, FoundEffect, Gain
+from ema.core.version import version
+from ema.discrepancy.findings import Findings, FoundEffect, Gain, graded
+from ema.effects import registry
 
 GAIN = Gain(0.1, 0.1, 0.1, 0.1, 0.1)
 
@@ -50,3 +52,42 @@ def test_what_was_found_before_is_not_overwritten(tmp_path):
     with pytest.raises(ConfigError, match=r"extended\.yaml: exists, and is not overwritten"):
         CliRunner().invoke(discrepancy, words, catch_exceptions=False)
     assert (found / "extended.yaml").read_bytes() == plant.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("verdict", "left", "says"),
+    [
+        ("explained", 1.1, "explained"),
+        ("explained", 1.3, "partly explained"),
+        ("unexplained", 1.3, "unexplained"),
+        ("adequate", 1.3, "adequate"),  # a rest without a cause is told by `rest`
+    ],
+)
+def test_what_leaves_more_than_noise_of_other_cycles_is_explained_in_part_only(verdict, left, says):
+    assert graded(verdict, Gain(1.0, 0.1, 1.0, 0.1 * left, 0.1)) == says
+
+
+def test_what_is_explained_in_part_says_what_is_left():
+    effect = FoundEffect("spring_load", 0.99, (), {}, "a spring", "slow motion")
+    gain = Gain(1.0, 0.1, 1.0, 0.23, 0.1)
+    named, rest = Findings("partly explained", [effect], gain, {"sentences": ["a torque even in speed"]}).sentences()
+    assert named == "A spring."
+    assert "2.3 times what noise makes" in rest
+    assert "a torque even in speed" in rest
+
+
+def test_findings_say_where_a_cause_acts_what_lost_and_what_made_them():
+    recorder = registry()["recorder_gain"]
+    effect = FoundEffect(recorder.name, 0.99, (), {}, "reads low", "both recorders", recorder.place)
+    lost = {"name": "inertia", "before": 9.0, "after": 5.0, "why": "leaves 5"}
+    said = Findings("explained", [effect], GAIN, rejected=[lost], seeds={"fit": 7}).as_dict()
+    assert said["effects"][0]["place"] == "recorder"
+    assert said["rejected"] == [lost]
+    assert (said["version"], said["seeds"]) == (version(), {"fit": 7})
+
+
+def test_sensors_of_the_loop_and_of_the_recorder_are_different_effects():
+    places = {name: effect.place for name, effect in registry().items()}
+    assert places["current_gain"] == places["current_offset"] == places["controller_delay"] == "loop"
+    assert places["recorder_gain"] == places["recorder_offset"] == places["recorder_delay"] == "recorder"
+    assert places["cogging"] == "plant"

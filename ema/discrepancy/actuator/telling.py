@@ -9,13 +9,14 @@ from typing import Any, Literal
 import numpy as np
 
 from ema.core.names import FAULTS
-from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
+from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity, graded
 from ema.effects import registry
 
 from . import controller, repeating
 from .candidates import Candidate
 from .extension import as_extension
-from .fit import Fit
+from .fit import SEED, Fit
+from .noise import SEED as NOISE_SEED
 from .noise import Verdict
 from .plant import ENVELOPE_STEP, EmaPlant, Point
 from .search import CHANCE, FINAL_SEED, K_SEEN, N_FINAL, Model, Search
@@ -30,6 +31,7 @@ LITTLE = 2.0  # what faults alone leave is no more than this excess, which two e
 LOUD, MOST = 1.3, 0.5  # misfit of a cycle that shows a rest; share of it that is worth a word
 ENVELOPE_SETTLING = 15e-3  # [s]
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
+SEEDS = {"noise": NOISE_SEED, "fit": SEED, "held out": FINAL_SEED}  # the first of each
 NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none
 
 
@@ -83,7 +85,30 @@ def told(search: Search, before: Model, after: Model, v: Verdict, alike: list[tu
         values = {name: q.value for name, q in unnamed[0].parameters.items()}
         unnamed = [replace(unnamed[0], sentence=f"a further {registry()['cogging'].said(values)}")]
         notes.append(f"beside it stands {unnamed[0].sentence}")
-    return Findings(verdict, found, _gain(search, before, after), shape, tried, notes, unnamed=unnamed)
+    gain = _gain(search, before, after)
+    return Findings(
+        graded(verdict, gain), found, gain, shape, tried, notes,
+        unnamed=unnamed, rejected=rejected(search, before, after), seeds=SEEDS,
+    )  # fmt: skip
+
+
+def rejected(search: Search, before: Model, after: Model) -> list[dict[str, Any]]:
+    """Sets of causes that were fitted and are not the answer, by what they leave of held-out cycles over noise."""
+    best: dict[str, float] = {}
+    for m in search.tried:
+        if m.effects and set(m.names) != set(after.names):
+            name = " + ".join(sorted(m.names))
+            best[name] = min(m.heldout, best.get(name, np.inf))
+    answer = " + ".join(after.names) or "faults alone"
+    return [
+        {
+            "name": name,
+            "before": before.heldout,
+            "after": left,
+            "why": f"leaves {left:.3g} of held-out cycles where noise is 1; {answer}: {after.heldout:.3g}",
+        }
+        for name, left in sorted(best.items(), key=lambda item: item[1])
+    ]
 
 
 def _recorded_once(search: Search, model: Model) -> list[str]:
@@ -119,7 +144,7 @@ def with_function(search: Search, findings: Findings, before: Model, after: Mode
             continue
         e = registry()[effect]
         quantities = {p.name: Quantity(values[p.name], values[p.name], values[p.name], p.unit) for p in e.parameters}
-        unnamed = [FoundEffect(effect, 0.0, (), quantities, e.said(values), e.separated_by)]
+        unnamed = [FoundEffect(effect, 0.0, (), quantities, e.said(values), e.separated_by, e.place)]
         share = 1.0 - m.excess / base.excess
         findings.structure["sentences"].append(f"{e.said(values)}, takes {share:.0%} of the rest")
         return replace(findings, unnamed=unnamed, gain=_gain(search, before, m)), m
@@ -159,7 +184,7 @@ def _found(
                 values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
             )
     own, *_ = odds(search, model, effect)
-    return FoundEffect(e.name, own, alike, parameters, e.said(values), e.separated_by)
+    return FoundEffect(e.name, own, alike, parameters, e.said(values), e.separated_by, e.place)
 
 
 def _whatever_the_cause(

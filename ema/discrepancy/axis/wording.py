@@ -38,7 +38,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
     notes += _moved(plant, outcome) + _kinds(plant) + _zeros(plant, outcome)
     return shared.Findings(
-        outcome.verdict,
+        shared.graded(outcome.verdict, gain),
         [_effect(e) for e in outcome.effects],
         gain,
         structure,
@@ -67,7 +67,8 @@ def _moved(plant: AxisPlant, outcome: Outcome) -> list[str]:
 def _effect(e: dict[str, Any]) -> shared.FoundEffect:
     parameters = {name: shared.Quantity(**q) for name, q in e["parameters"].items()}
     others = tuple(e["indistinguishable_from"])
-    return shared.FoundEffect(e["name"], e["confidence"], others, parameters, e["sentence"], e["separated_by"])
+    place = registry()[e["name"]].place if e["name"] in registry() else "plant"
+    return shared.FoundEffect(e["name"], e["confidence"], others, parameters, e["sentence"], e["separated_by"], place)
 
 
 def _kinds(plant: AxisPlant) -> list[str]:

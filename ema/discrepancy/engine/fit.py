@@ -26,6 +26,7 @@ KEPT = 0.25  # share of the promised gain from which a step is trusted
 SHARES = (2.0, 1.0, 0.5, 0.2)  # of a step, that are simulated at once
 
 Residuals = Callable[[Array], Array]  # points (n, p) to whitened residuals (n, m): measured less simulated
+Responses = Callable[[Array, Array], Array]  # a point (p,) and points (n, p) to how simulated ones differ, (n, m)
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,7 @@ def fit(
     steps: Array,
     turns: int = TURNS,
     columns: Array | None = None,
+    responses: Responses | None = None,
 ) -> Fit:
     """Bounded least squares from one start.
 
@@ -67,13 +69,16 @@ def fit(
         Changes that are clearly felt, by which the first columns are taken; they set the scale of each parameter.
     columns : array, shape (m, p), optional
         Known roughly: they tell the first directions, and spare the columns along parameters.
+    responses : callable, optional
+        How simulated points differ, where that costs less than `residuals` of each.
     """
+    respond = responses or (lambda at, points: residuals(at[None]) - residuals(points))
     x = np.clip(start, low, high)
     V = np.diag(np.abs(steps))
     r = residuals(x[None])[0]
-    J = columns_along(residuals, x, V, low, high) if columns is None else columns
+    J = columns_along(respond, x, V, low, high) if columns is None else columns
     V = _singular(J, V)
-    J = columns_along(residuals, x, V, low, high)
+    J = columns_along(respond, x, V, low, high)
     cost, radius = float(r @ r), np.inf
     for _ in range(turns):
         step, promised = bounded_step(J, r, x, low, high, V, radius)
@@ -82,7 +87,7 @@ def fit(
         ahead = residuals(np.clip(x + step, low, high)[None])[0]
         bend, _ = bounded_step(J, ahead - (r - J @ step), x + step, low, high, V, np.inf)
         share = np.array(SHARES)[:, None]
-        tried = np.clip(np.concatenate([x + share * step + share**2 * bend, x + share * step]), low, high)
+        tried = np.clip(np.concatenate([x + share * step + share**2 * bend, x[None] + step]), low, high)
         left = residuals(tried)
         costs = (left**2).sum(axis=1)
         best = int(np.argmin(costs))
@@ -94,7 +99,7 @@ def fit(
         if gain > 0.0:
             x, r, cost = tried[best], left[best], float(costs[best])
         V = _singular(J, V)
-        J = columns_along(residuals, x, V, low, high)
+        J = columns_along(respond, x, V, low, high)
     return Fit(x, J, r, cost)
 
 
@@ -106,9 +111,12 @@ def best_of(
     steps: Array,
     turns: int = TURNS,
     columns: Array | None = None,
+    responses: Responses | None = None,
 ) -> list[Fit]:
     """Fits from several starts, best first; those that ended where a better one did are left out."""
-    found = sorted((fit(residuals, s, low, high, steps, turns, columns) for s in starts), key=lambda f: f.cost)
+    found = sorted(
+        (fit(residuals, s, low, high, steps, turns, columns, responses) for s in starts), key=lambda f: f.cost
+    )
     kept: list[Fit] = []
     for f in found:
         if all(float(((g.columns @ (f.x - g.x)) ** 2).sum()) > len(f.x) for g in kept):
@@ -116,14 +124,12 @@ def best_of(
     return kept
 
 
-def columns_along(residuals: Residuals, x: Array, V: Array, low: Array, high: Array) -> Array:
+def columns_along(respond: Responses, x: Array, V: Array, low: Array, high: Array) -> Array:
     """Columns per unit of each parameter, from steps along the columns of V (p, p) to both sides within bounds."""
-    ahead, back = (np.clip(x[:, None] + sign * V, low[:, None], high[:, None]) for sign in (1.0, -1.0))
-    r = residuals(np.concatenate([ahead.T, back.T]))
+    ahead, back = (np.clip(x[:, None] + sign * V, low[:, None], high[:, None]).T for sign in (1.0, -1.0))
+    response = respond(x, np.concatenate([ahead, back]))
     p = V.shape[1]
-    moved = (ahead - back).T  # (p directions, p parameters)
-    response = r[p:] - r[:p]  # measured less simulated: simulated ahead less behind
-    J, *_ = np.linalg.lstsq(moved, response, rcond=1e-9)
+    J, *_ = np.linalg.lstsq(ahead - back, response[:p] - response[p:], rcond=1e-9)
     return np.asarray(J.T)
 
 

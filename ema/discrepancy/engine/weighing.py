@@ -129,6 +129,18 @@ class Scale:
 
         return at
 
+    def responses(self, parameters: Sequence[Parameter]) -> Callable[[Array, Array], Array]:
+        """How the statistics of simulated points (n, p) differ from those of one (p,); of the rest nothing is told."""
+        of = seeds(Pool.COLUMN, self.budget.column_seeds)
+        names = [p.name for p in parameters]
+
+        def between(at: Array, x: Array) -> Array:
+            here, *points = (dict(zip(names, row.tolist(), strict=True)) for row in (at, *x))
+            t = self.whitening.white(self.problem.differences(here, points, of)) @ self.statistic.basis
+            return np.pad(t, ((0, 0), (0, 1)))
+
+        return between
+
     def weigh(self, h: Hypothesis, columns: Array | None = None) -> Weighed:
         """Simulate a hypothesis and integrate over all near it."""
         parameters = self.parameters(h.causes)
