@@ -88,6 +88,8 @@ class Findings:
         leaves of held-out parts over noise, and ``why``.
     seeds : dict
         Of the simulations that the answer rests on, where there are any.
+    balance : dict
+        What a regression of the balance of torque along the measured motion explains, where the plant has one.
     """
 
     verdict: Verdict
@@ -102,6 +104,7 @@ class Findings:
     rest: float = 0.0
     rejected: list[dict[str, Any]] = field(default_factory=list)
     seeds: dict[str, int] = field(default_factory=dict)
+    balance: dict[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """The content of findings.json."""
@@ -130,6 +133,7 @@ class Findings:
             **({"records": self.records} if self.records else {}),
             "version": version(),
             "seeds": self.seeds,
+            **({"balance": self.balance} if self.balance else {}),
         }
 
     def write(self, path: Path) -> None:
@@ -155,7 +159,8 @@ class Findings:
             left = f"That is not all: on held-out parts {self.gain.rest:.3g} times what noise makes is left"
             said.append(left + ("; its structure: " + describe(self.structure) if self.structure else "") + ".")
         if self.verdict == "unexplained":
-            said.append("No effect of the library explains the rest; its structure: " + describe(self.structure) + ".")
+            none = "none that stands out" if not self.balance.get("terms") else "what the balance shows"
+            said.append(f"No effect of the library explains the rest; its structure: {describe(self.structure, none)}.")
         return said
 
 
@@ -178,7 +183,7 @@ def _said(effect: FoundEffect) -> str:
     return text + "."
 
 
-def describe(structure: dict[str, Any]) -> str:
+def describe(structure: dict[str, Any], none: str = "none that stands out") -> str:
     """The structure of an unexplained residual in words."""
     parts = [str(text) for text in structure.get("sentences", [])]
-    return "; ".join(parts) if parts else "none that stands out"
+    return "; ".join(parts) if parts else none

@@ -49,6 +49,7 @@ class AxisPlant:
 
     def __init__(self, plant: Axis, records: Sequence[Record], n_threads: int | None = None):
         self.plant = plant
+        self.records = tuple(records)
         self.between = "straight"
         names = _distinct([r.source.stem if r.source else f"record {k + 1}" for k, r in enumerate(records)])
         self.n_threads = n_threads or min(os.cpu_count() or 1, 8)

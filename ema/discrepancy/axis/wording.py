@@ -10,6 +10,8 @@ from ema.discrepancy.outcome import Outcome
 from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
+from .balance import balance
+from .balance.telling import sentences, told
 from .plant import AxisPlant
 
 MOVED = 0.02  # of the plant file's friction: less is not worth a word
@@ -36,6 +38,8 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     notes = [*outcome.notes]
     if outcome.verdict != "adequate":
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
+    said = _balance(plant)
+    notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
     notes += _moved(plant, outcome) + _kinds(plant) + _zeros(plant, outcome)
     return shared.Findings(
         shared.graded(outcome.verdict, gain),
@@ -47,7 +51,14 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         [asdict(r) for r in outcome.records],
         _fitted(plant, outcome),
         rest=outcome.rest,
+        balance=said,
     )
+
+
+def _balance(plant: AxisPlant) -> dict[str, Any]:
+    """The regression on the balance; empty where no stretch of motion is long enough."""
+    found = balance(plant)
+    return {} if found is None else told(found, linear=isinstance(plant.plant, LinearAxis))
 
 
 def _moved(plant: AxisPlant, outcome: Outcome) -> list[str]:

@@ -1,0 +1,220 @@
+"""Which laws the records need, and what cannot be told from each: forward and backward on held-out blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ema.core.records import Array
+from ema.models.axis_config import LinearAxis
+
+from .attenuation import Corrected, attenuation
+from .course import courses
+from .law import Law
+from .laws import LINES, laws
+from .regression import Plain, Regression, fitted
+from .rows import Rows, half_widths, rows
+
+if TYPE_CHECKING:
+    from ema.discrepancy.axis.plant import AxisPlant
+
+MOST_LAWS = 8
+CLEAR = 3.0  # deviations over blocks by which a law must foretell held-out blocks better
+MATTERS = 0.1  # share of what is left that a law must take
+LEAST = 3e-4  # share of the drive's torque in power that a law must take
+SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
+N_DRAWS = 400  # of blocks, to see how often a law wins
+
+
+@dataclass(frozen=True)
+class Term:
+    """A law that the records need.
+
+    `power` is the mean square [N² m² or N²] that held-out blocks lose by it, `alike` what does as well, by how often
+    it wins over draws of blocks; `wins` how often this law does. `common` is the share that another law of the
+    library has on average in common with this one, on these motions: so much of an unknown rest may be taken for it.
+    """
+
+    law: Law
+    power: float
+    wins: float
+    alike: dict[str, float]
+    common: float
+
+
+@dataclass(frozen=True)
+class Balance:
+    """What a regression of the balance explains.
+
+    Attributes
+    ----------
+    corrected : Corrected
+        Coefficients without what noise in the regressors takes from them, with their covariance.
+    drive : float
+        Mean square of the drive's torque about its mean. [N² m² or N²]
+    left_plain, left_base, left : float
+        Mean square left on held-out blocks by the plant file's numbers, with inertia, friction and drag fitted, and
+        with the laws found.
+    noise : float
+        What the sensors' noise leaves.
+    """
+
+    model: Regression
+    corrected: Corrected
+    plain: Plain
+    terms: tuple[Term, ...]
+    drive: float
+    left_plain: float
+    left_base: float
+    left: float
+    noise: float
+
+    def confidence(self, term: Term) -> float:
+        """How often the law wins, times its mark over that and what of the rest it may have been taken for."""
+        rest = term.common * max(self.left - self.noise, 0.0)
+        return term.wins * term.power / (term.power + rest) if term.power > 0.0 else 0.0
+
+    def explained(self, left: float) -> float:
+        """Share of the drive's torque, as a coefficient of determination."""
+        return 1.0 - left / self.drive
+
+
+def balance(plant: AxisPlant) -> Balance | None:
+    """The balance of all records; None where no stretch of motion is long enough."""
+    p = plant.plant
+    plain = Plain(p.inertia, p.F_d, p.C)
+    recorded = courses(plant)
+    found = rows(plant, recorded)
+    if found is None:
+        return None
+    first = fitted(found, plain, [])
+    inertia = float(first.coefficients[0]) if "inertia" in first.base else p.inertia
+    widths = half_widths(recorded, abs(inertia), float(np.sqrt(np.mean(found.drive**2))))
+    found = rows(plant, recorded, widths) or found
+    every = list(laws(found.motion, linear=isinstance(p, LinearAxis)))
+    return chosen(found, plain, every, lambda model: attenuation(plant, recorded, widths, plain, model))
+
+
+def chosen(
+    found: Rows, plain: Plain, every: Sequence[Law], errors_in_regressors: Callable[[Regression], Corrected]
+) -> Balance:
+    """Forward and backward selection."""
+    n = int(found.whole.sum())
+    drive = float(np.var(found.drive[found.whole]))
+    base = fitted(found, plain, [])
+    model = base
+    while len(model.laws) < MOST_LAWS:
+        trials = _trials(found, plain, model, every)
+        best = _simplest(trials, drive * n)
+        if best is None or not _is_needed(best, model, drive * n):
+            break
+        model = _revised(found, plain, best, every, drive * n)
+    while (fewer := _exchanged(found, plain, model, every, drive * n)) is not None:
+        model = fewer
+    terms = tuple(_term(found, plain, model, law, every) for law in model.laws)
+    return Balance(
+        model, errors_in_regressors(model), plain, terms, drive,
+        float(np.mean((found.y - plain.inertia * found.alpha)[found.whole] ** 2)),
+        base.loss / n, model.loss / n, float(np.mean(found.sigma[found.whole] ** 2)),
+    )  # fmt: skip
+
+
+def _simplest(trials: Sequence[Regression], whole: float) -> Regression | None:
+    """The trial that leaves least; of two of which one holds the other, the larger only where it needs to be."""
+    best = min(trials, key=lambda r: r.loss, default=None)
+    if best is None:
+        return None
+    held = [r for r in trials if r.laws[-1].family in HOLDS.get(best.laws[-1].family, ())]
+    return next((r for r in held if not _is_needed(best, r, whole)), best)
+
+
+def _trials(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) -> list[Regression]:
+    """The model with one law more: of each family that is not in it the member that fits best."""
+    have = {law.key for law in model.laws}
+    single = {law.family for law in model.laws if law.family not in LINES}
+    single |= {other for law in model.laws for other in HOLDS.get(law.family, ())}
+    members: dict[str, list[Law]] = {}
+    for law in every:
+        if law.key not in have and law.family not in single:
+            members.setdefault(law.family, []).append(law)
+    return [fitted(found, plain, [*model.laws, _best(found, model, own)]) for own in members.values()]
+
+
+HOLDS = {"spring": ("constant",)}  # a spring has its own zero
+
+
+def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
+    """The member of a family whose columns take most of what is left."""
+    if len(members) == 1:
+        return members[0]
+    q, _ = np.linalg.qr(model.design)
+    left = model.left - q @ (q.T @ model.left)
+    columns = [found.of(law, law.columns(found.motion, model.acting)) for law in members]
+    A = np.stack([np.stack(own, axis=1) for own in columns])  # (n_members, n_rows, n_columns)
+    A = A - np.einsum("rk,mkc->mrc", q, np.einsum("rk,mrc->mkc", q, A))
+    gram, b = np.einsum("mrc,mrd->mcd", A, A), np.einsum("mrc,r->mc", A, left)
+    gains = np.einsum("mc,mcd,md->m", b, np.linalg.pinv(gram, rcond=1e-6, hermitian=True), b)
+    return members[int(np.argmax(gains))]
+
+
+def _is_needed(new: Regression, old: Regression, whole: float) -> bool:
+    """Clearly better over blocks, by a share of what is left and of the drive's torque that matters."""
+    d = old.losses - new.losses
+    gain = float(d.sum())
+    clear = gain > CLEAR * float(np.sqrt(len(d)) * np.std(d))
+    return clear and gain > MATTERS * old.loss and gain > LEAST * whole
+
+
+def _revised(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], whole: float) -> Regression:
+    """Without laws that later ones made superfluous, or with another in their place that does clearly better."""
+    for law in model.laws[:-1]:
+        if law.family in LINES:
+            continue  # lines stand beside each other
+        without = fitted(found, plain, [own for own in model.laws if own.key != law.key])
+        if not _is_needed(model, without, whole):
+            model = without
+            continue
+        other = _simplest(_trials(found, plain, without, every), whole)
+        if other is not None and other.laws[-1].key != law.key and _is_needed(other, model, whole):
+            model = other
+    return model
+
+
+def _exchanged(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], whole: float) -> Regression | None:
+    """A model of fewer laws that leaves no more: one law may do what several stood in for."""
+    single = [law for law in model.laws if law.family not in LINES]
+    for trial in _trials(found, plain, model, every) if len(single) > 1 else ():
+        reduced = trial
+        for law in single:
+            without = fitted(found, plain, [own for own in reduced.laws if own.key != law.key])
+            if not _is_needed(reduced, without, whole):
+                reduced = without
+        if len(reduced.laws) < len(model.laws) and not _is_needed(model, reduced, whole):
+            return reduced
+        if len(reduced.laws) == len(model.laws) and _is_needed(reduced, model, whole):
+            return reduced
+    return None
+
+
+def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequence[Law]) -> Term:
+    """How sure a law is beside all that could stand in its place."""
+    without = fitted(found, plain, [own for own in model.laws if own.key != law.key])
+    others = [r for r in _trials(found, plain, without, every) if r.laws[-1].key != law.key]
+    rivals: dict[str, Array] = {}
+    for r in others:
+        own = r.laws[-1].name
+        if law.family in HOLDS.get(r.laws[-1].family, ()) and not _is_needed(r, model, 0.0):
+            continue  # it can do what this law does and more, and need not
+        if own != law.name and (own not in rivals or r.loss < float(rivals[own].sum())):
+            rivals[own] = r.losses
+    names, losses = [law.name, *rivals], np.stack([model.losses, *rivals.values()])
+    rng = np.random.default_rng(0)
+    drawn = rng.multinomial(losses.shape[1], np.full(losses.shape[1], 1.0 / losses.shape[1]), N_DRAWS)
+    winners = np.argmin(losses @ drawn.T, axis=0)
+    share = {name: float(np.mean(winners == k)) for k, name in enumerate(names)}
+    alike = {name: share[name] for name in rivals if share[name] > SELDOM}
+    common = float(np.mean([model.shared(law, r) for r in others])) if others else 0.0
+    return Term(law, (without.loss - model.loss) / max(int(found.whole.sum()), 1), share[law.name], alike, common)

@@ -1,0 +1,73 @@
+"""What a law of the balance is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from ema.core.records import Array
+
+from .rows import Motion
+
+
+@dataclass(frozen=True)
+class Acting:
+    """What acts along the motion by the model so far: arrays of shape (n_samples,). [N m or N]
+
+    `motor` is the torque the drive must give, `load` what of it is not friction, `held` what of that is not inertia.
+    """
+
+    motor: Array
+    load: Array
+    held: Array
+
+
+Columns = Callable[[Motion, Acting], tuple[Array, ...]]
+Values = Callable[[Array], Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law, linear in its coefficients.
+
+    Parameters
+    ----------
+    family, key : str
+        One member of a family acts (but of lines several may); families compete.
+    name : str
+        Of the effect, as `ema.effects` has it where it has it.
+    columns : function (motion, acting) → arrays of shape (n_samples,)
+    parameters : mapping of str to str
+        Units by name; `values` makes them of the coefficients.
+    sentence : str
+        With the parameters' names in braces.
+    also : tuple of str
+        Laws that no balance of one axis can tell from it.
+    is_friction : bool
+        Whether it takes power whichever way the axis goes; else it is a load.
+    needs_acting : bool
+        Whether its columns depend on what else acts.
+    n_columns : int
+    """
+
+    family: str
+    key: str
+    name: str
+    columns: Columns
+    parameters: Mapping[str, str]
+    values: Values
+    sentence: str
+    separated_by: str
+    also: tuple[str, ...] = ()
+    is_friction: bool = False
+    needs_acting: bool = False
+    n_columns: int = 1
+
+
+def one(name: str, **shape: float) -> Values:
+    """The only coefficient, and the shape of the law beside it."""
+
+    def values(c: Array) -> Mapping[str, float]:
+        return {name: float(c[0]), **shape}
+
+    return values

@@ -1,0 +1,181 @@
+"""Least squares of the balance with held-out blocks, and intervals on which blocks agree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema.core.records import Array
+
+from .law import Acting, Law
+from .rows import N_FOLDS, Rows
+
+N_ROUNDS = 6  # of laws that depend on what else acts, which depends on them
+BASE = ("inertia", "dry_friction", "viscous_drag")
+
+
+@dataclass(frozen=True)
+class Plain:
+    """What the plant file says of inertia, dry friction and drag."""
+
+    inertia: float
+    F_d: float
+    C: float
+
+
+@dataclass(frozen=True)
+class Regression:
+    """A fitted balance.
+
+    Attributes
+    ----------
+    laws : tuple of Law
+    base : tuple of str
+        Those of `BASE` that the motions can show.
+    design : array, shape (n_rows, n_coefficients)
+        Columns of the base, then of the laws.
+    coefficients : array, shape (n_coefficients,)
+        Of dry friction and drag: less the plant file's.
+    left : array, shape (n_rows,)
+        Residual. [N m or N]
+    held_out : array, shape (n_rows,)
+        Residual of rows whose block was not fitted; nan for rows that lie in two blocks.
+    acting : Acting
+    """
+
+    rows: Rows
+    laws: tuple[Law, ...]
+    base: tuple[str, ...]
+    design: Array
+    coefficients: Array
+    left: Array
+    held_out: Array
+    acting: Acting
+
+    @property
+    def losses(self) -> Array:
+        """Square of the held-out residual, summed over each block, shape (n_blocks,)."""
+        return np.asarray(
+            np.bincount(self.rows.block, np.nan_to_num(self.held_out) ** 2, self.rows.n_blocks), np.float64
+        )
+
+    @property
+    def loss(self) -> float:
+        """The same over all blocks."""
+        return float(self.losses.sum())
+
+    def part(self, law: Law) -> slice:
+        """Which coefficients are those of a law."""
+        at = len(self.base)
+        for own in self.laws:
+            n = own.n_columns
+            if own.key == law.key:
+                return slice(at, at + n)
+            at += n
+        raise KeyError(law.key)
+
+    def shared(self, law: Law, other: Regression) -> float:
+        """Share of what the last law of `other` does, beside all that both have, that `law` can do as well."""
+        mine = self.part(law)
+        rest = np.delete(self.design, mine, axis=1)
+        q, _ = np.linalg.qr(rest)
+        own, its = self.design[:, mine], other.design[:, other.part(other.laws[-1])]
+        own, its = (x - q @ (q.T @ x) for x in (own, its))
+        basis, _ = np.linalg.qr(own)
+        return float(np.sum((basis.T @ its) ** 2) / max(float(np.sum(its**2)), 1e-300))
+
+    def covariance(self) -> Array:
+        """Of the coefficients, from how blocks disagree (neighbouring rows overlap, and no law is quite right)."""
+        A = self.design
+        bread = np.linalg.pinv(A.T @ A, rcond=1e-12, hermitian=True)
+        scores = np.zeros((self.rows.n_blocks, A.shape[1]))
+        np.add.at(scores, self.rows.block, A * self.left[:, None])
+        n = self.rows.n_blocks
+        return np.asarray(bread @ (scores.T @ scores) @ bread * n / max(n - 1, 1))
+
+
+def fitted(rows: Rows, plain: Plain, laws: Sequence[Law]) -> Regression:
+    """Fit the base and `laws`."""
+    base, columns = _base(rows)
+    m = rows.motion
+    acting = Acting(m.drive, m.drive, m.drive)
+    waits = any(law.needs_acting for law in laws)
+    if waits:
+        acting = fitted(rows, plain, [law for law in laws if not law.needs_acting]).acting
+    for _ in range(N_ROUNDS if waits else 1):
+        own = [law.columns(m, acting) for law in laws]
+        integrated = [column for law, part in zip(laws, own, strict=True) for column in rows.of(law, part)]
+        design = np.column_stack([columns, *integrated])
+        coefficients = _solved(design, rows.y)
+        acting = _acting(rows, plain, base, laws, own, coefficients)
+    left = rows.y - design @ coefficients
+    return Regression(
+        rows, tuple(laws), base, design, coefficients, left, _held_out(rows, design), acting
+    )  # fmt: skip
+
+
+def _base(rows: Rows) -> tuple[tuple[str, ...], Array]:
+    """Columns of inertia, dry friction and drag: those that the motions can show."""
+    m = rows.motion
+    parts = {
+        "inertia": rows.alpha,
+        "dry_friction": rows.integrate @ m.direction,
+        "viscous_drag": rows.integrate @ m.w,
+    }
+    kept: dict[str, Array] = {}
+    for name, column in parts.items():
+        size = float(np.linalg.norm(column))
+        if size == 0.0:
+            continue
+        other = np.column_stack(list(kept.values())) if kept else np.zeros((len(column), 1))
+        beside = column - other @ np.linalg.lstsq(other, column, rcond=None)[0]
+        if float(np.linalg.norm(beside)) > 0.03 * size:
+            kept[name] = column
+    return tuple(kept), np.column_stack(list(kept.values()))
+
+
+def _solved(design: Array, y: Array) -> Array:
+    size = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
+    A = design / size
+    return _of_normal(A.T @ A, A.T @ y) / size
+
+
+def _of_normal(gram: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ right)
+
+
+def _held_out(rows: Rows, design: Array) -> Array:
+    """Residual of each row by coefficients to which its fold did not belong."""
+    size = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
+    A, fold = design / size, rows.block % N_FOLDS
+    parts = [(A[fold == k].T @ A[fold == k], A[fold == k].T @ rows.y[fold == k]) for k in range(N_FOLDS)]
+    gram, right = (np.sum(column, axis=0) for column in zip(*parts, strict=True))
+    out = np.full(len(rows.y), np.nan)
+    for k, (own_gram, own_right) in enumerate(parts):
+        test = (fold == k) & rows.whole
+        out[test] = rows.y[test] - A[test] @ _of_normal(gram - own_gram, right - own_right)
+    return out
+
+
+def _acting(
+    rows: Rows, plain: Plain, base: tuple[str, ...], laws: Sequence[Law], own: Sequence[tuple[Array, ...]], c: Array
+) -> Acting:
+    """The drive's torque that this model needs, and what of it is no friction. [N m or N]"""
+    m = rows.motion
+    beyond = m.drive - m.known  # what the plant file takes
+    friction = plain.F_d * m.direction + plain.C * m.w
+    values = dict(zip(base, c, strict=False))
+    dissipated = values.get("dry_friction", 0.0) * m.direction + values.get("viscous_drag", 0.0) * m.w
+    load = values.get("inertia", 0.0) * m.a
+    at = len(base)
+    for law, columns in zip(laws, own, strict=True):
+        for column in columns:
+            if law.is_friction:
+                dissipated = dissipated + c[at] * column
+            else:
+                load = load + c[at] * column
+            at += 1
+    inertia = values.get("inertia", 0.0) * m.a
+    return Acting(beyond + load + dissipated, beyond - friction + load, beyond - friction + load - inertia)

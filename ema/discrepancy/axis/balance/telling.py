@@ -1,0 +1,132 @@
+"""The balance in words and numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ema.core.records import Array
+from ema.discrepancy.axis.linear import in_metres
+
+from .choice import Balance, Term
+
+INTERVAL = (2.5, 97.5)  # percent
+N_DRAWS = 400
+BELOW = 2.0  # deviations below zero from which a value is implausible
+SURE = 0.9
+NAMES = {"inertia": "inertia", "dry_friction": "dry friction", "viscous_drag": "drag"}
+UNITS = {"inertia": "kg m^2", "dry_friction": "N m", "viscous_drag": "N m s/rad"}
+MADE_BY = {  # what makes a fitted value implausible
+    "inertia": "a drive's torque that is late, or a gain of it that is wrong",
+    "dry_friction": "drag in its place (one speed does not tell them apart), or a load that follows the motion",
+    "viscous_drag": "friction that falls with speed, or a back-EMF constant that is too large",
+    "share": "a load that the model has not, or a drive whose torque is wrong",
+}
+
+
+def told(b: Balance, *, linear: bool) -> dict[str, Any]:
+    """The balance for findings.json."""
+    drawn = _drawn(b)
+    unit = "N" if linear else "N m"
+    return {
+        "drive_rms": _short(b.drive**0.5),
+        "unit": unit,
+        "explained": {
+            "plant_file": _short(b.explained(b.left_plain)),
+            "fitted": _short(b.explained(b.left_base)),
+            "with_laws": _short(b.explained(b.left)),
+        },
+        "left_rms": _short(b.left**0.5),
+        "noise_rms": _short(b.noise**0.5),
+        "rows": len(b.model.rows.y),
+        "test_function": _short(2.0 * b.model.rows.half),
+        "base": {name: _base(b, k, name, drawn, linear) for k, name in enumerate(b.model.base)},
+        "terms": [_term(b, term, drawn) for term in b.terms],
+    }
+
+
+def _short(x: float) -> float:
+    return float(f"{x:.5g}")
+
+
+def _drawn(b: Balance) -> Array:
+    """Coefficients drawn from their uncertainty, shape (N_DRAWS, n)."""
+    rng = np.random.default_rng(0)
+    return rng.multivariate_normal(b.corrected.coefficients, b.corrected.covariance, N_DRAWS, method="eigh")
+
+
+def _nominal(b: Balance, name: str) -> float:
+    return {"inertia": b.plain.inertia, "dry_friction": b.plain.F_d, "viscous_drag": b.plain.C}[name]
+
+
+def _base(b: Balance, k: int, name: str, drawn: Array, linear: bool) -> dict[str, Any]:
+    nominal = _nominal(b, name)
+    more = 0.0 if name == "inertia" else nominal  # friction and drag are fitted beside the plant file's
+    value = float(b.corrected.coefficients[k]) + more
+    low, high = np.percentile(drawn[:, k] + more, INTERVAL)
+    unit = in_metres(UNITS[name]) if linear else UNITS[name]
+    out: dict[str, Any] = {"value": _short(value), "low": _short(low), "high": _short(high), "unit": unit}
+    out["plant_file"] = nominal
+    if value < -BELOW * float(np.std(drawn[:, k])):
+        out["implausible"] = f"{NAMES[name]} cannot be negative: it may be {MADE_BY[name]}"
+    return out
+
+
+def _term(b: Balance, term: Term, drawn: Array) -> dict[str, Any]:
+    part = b.model.part(term.law)
+    values = term.law.values(b.corrected.coefficients[part])
+    samples = [term.law.values(c) for c in drawn[:, part]]
+    parameters = {}
+    for name, unit in term.law.parameters.items():
+        spread = np.array([s[name] for s in samples])
+        if name == "phase":
+            spread = values[name] + np.angle(np.exp(1j * (spread - values[name])))
+        low, high = np.percentile(spread, INTERVAL)
+        parameters[name] = {"value": _short(values[name]), "low": _short(low), "high": _short(high), "unit": unit}
+    others = sorted({*term.alike, *term.law.also})
+    out = {
+        "name": term.law.name,
+        "confidence": round(b.confidence(term), 4),
+        "indistinguishable_from": others,
+        "parameters": parameters,
+        "sentence": term.law.sentence.format(**values),
+        "separated_by": term.law.separated_by,
+        "share": _short(term.power / b.drive),
+    }
+    if "share" in values and term.law.is_friction and values["share"] < 0.0:
+        out["implausible"] = f"friction cannot fall below zero with load: it may be {MADE_BY['share']}"
+    return out
+
+
+def sentences(balance: dict[str, Any]) -> list[str]:
+    """What an engineer would say of it."""
+    what = "force" if balance["unit"] == "N" else "torque"
+    share = balance["explained"]
+    base = ", ".join(_number(NAMES[name], q) for name, q in balance["base"].items())
+    out = [f"Balance of {what} along the measured motion: {base} explain {share['fitted']:.1%} of the drive's {what}"]
+    if balance["terms"]:
+        found = "; ".join(_said(term) for term in balance["terms"])
+        out[0] += f"; with {len(balance['terms'])} more, {_close(share['with_laws'])}: {found}"
+    left = balance["left_rms"] / max(balance["noise_rms"], 1e-300)
+    out[0] += (
+        f". {balance['left_rms']:.3g} {balance['unit']} rms is left, {left:.2g} times what the sensors' noise makes."
+    )
+    implausible = [q["implausible"] for q in (*balance["base"].values(), *balance["terms"]) if "implausible" in q]
+    return [*out, *(f"{text[0].upper()}{text[1:]}." for text in implausible)]
+
+
+def _close(share: float) -> str:
+    return f"{share:.1%}" if share < 0.9945 else f"{share:.2%}"
+
+
+def _number(name: str, q: dict[str, Any]) -> str:
+    return f"{name} {q['value']:.3g} {q['unit']} ({q['low']:.3g} … {q['high']:.3g}; plant file {q['plant_file']:.3g})"
+
+
+def _said(term: dict[str, Any]) -> str:
+    q = next(iter(term["parameters"].values()))
+    text = f"{term['sentence']} ({q['low']:.3g} … {q['high']:.3g})"
+    if term["indistinguishable_from"]:
+        text += f", or {' or '.join(term['indistinguishable_from'])}"
+    return text if term["confidence"] >= SURE else f"perhaps ({term['confidence']:.0%}) {text}"
