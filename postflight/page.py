@@ -12,9 +12,11 @@ import matplotlib
 import yaml
 from markupsafe import Markup
 
+from ema.core import pages
 from ema.core.names import FAULT_MEANING, FAULTS
 from ema.core.status import Status
 from ema.core.version import version
+from ema.core.words import REASON_MEANING, STATUS_MEANING
 from ema.log import LogReader
 
 from .health import Health, health
@@ -55,7 +57,7 @@ def page(log: LogReader, settings: ReportSettings) -> str:
     history = read(log, settings)
     attachments = log.attachments()
     actuators = [_actuator(one, health(one, settings, history.last_ns), settings) for one in history.actuators.values()]
-    return (
+    return pages.with_scrolling_tables(
         _environment()
         .get_template("report.html.j2")
         .render(
@@ -76,7 +78,10 @@ def page(log: LogReader, settings: ReportSettings) -> str:
             bundles=_bundles(attachments),
             daemon_yaml=attachments.get("daemon.yaml", b"").decode(errors="replace"),
             report_yaml=yaml.safe_dump(settings.model_dump(mode="json"), sort_keys=False),
-            css=Markup(files(__package__).joinpath("report.css").read_text(encoding="utf-8")),
+            css=Markup(pages.style()),
+            status_words=STATUS_MEANING,
+            reason_words=REASON_MEANING,
+            remarked={reason for a in actuators for reason in a["history"].reasons},
         )
     )
 
@@ -121,6 +126,7 @@ def _actuator(actuator: ActuatorHistory, now: Health, settings: ReportSettings) 
         "statuses": [(s.name.lower(), actuator.statuses[s.name.lower()]) for s in Status],
         "beside": _inline(figures.beside(actuator)) if actuator.beside else "",
         "trend": _inline(figures.trend(actuator, now, settings)),
+        "numbers": "; ".join(f"{f.fault} {f.k:.3f} ± {f.sd:.3f}" for f in now.faults),
         "envelopes": [{"caption": text, "src": _inline(figures.envelope(content))} for text, content in envelopes],
     }
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import jinja2
 
+from ema.core import pages
 from ema.core.version import version
 
 from .findings import Findings
@@ -55,5 +56,6 @@ def write_report(
         sentences=findings.sentences(),
         pictures=pictures,
         software=version(),
+        css=pages.style(),
     )
-    path.write_text(html, encoding="utf-8")
+    path.write_text(pages.with_scrolling_tables(html), encoding="utf-8")

@@ -2,12 +2,12 @@
 
 import json
 import re
-import shutil
 import subprocess
 
 import numpy as np
 import pytest
 import yaml
+from axe_look import BROWSER, look
 from click.testing import CliRunner
 from ema_postflight.report import report
 from ema_postflight.report_settings import ReportSettings, Severity
@@ -17,7 +17,6 @@ from ema.core import config, resources
 from ema.core.errors import ConfigError, LogError
 from ema.log import LogReader
 
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 LOOK = """<script>addEventListener("load", () => {
   const pictures = [...document.images].map(i => ({w: i.naturalWidth, shown: i.getBoundingClientRect().width}));
   const k = [...document.querySelectorAll("[data-fault]")].map(e => ({...e.dataset, text: e.innerText}));
@@ -52,6 +51,31 @@ def browser(page):
     found = re.search(r'<script type="application/json" id="seen">(.*?)</script>', done.stdout, re.S)
     complaints = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
     return json.loads(found.group(1)), complaints
+
+
+SCREENS = {
+    "laptop": (1280, 900, False),
+    "laptop, dark": (1280, 900, True),
+    "phone": (390, 844, False),
+    "phone, dark": (390, 844, True),
+}
+
+
+@pytest.fixture(scope="module", params=SCREENS)
+def violations(request, page):
+    """What axe-core finds wrong with the page on a screen, and whether the page is wider than that."""
+    if BROWSER is None:
+        pytest.skip("no chromium here: apt-get install chromium")
+    return look(page, *SCREENS[request.param])
+
+
+def test_nothing_keeps_anybody_from_reading_it_on_any_screen(violations):
+    assert violations["found"] == []
+    assert violations["n_rules"] > 20
+
+
+def test_the_page_is_no_wider_than_the_screen(violations):
+    assert not violations["wide"]
 
 
 def test_no_error_is_on_the_console_and_nothing_is_loaded(browser):
