@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,12 +35,22 @@ VISIBLE = 1.2  # times what noise makes of the record
 def trial(name: str, seed: int, n_cycles: int, *, varied: bool = True, n_threads: int = 2) -> dict[str, Any]:
     """One hidden flaw, found or not."""
     values, k = cases.draw(name, seed)
-    flaws = hidden.Flaws(**values, **{f"k{j + 1}": x for j, x in enumerate(k)})
     motions, bench = cases.draw_bench(hidden, name, seed) if varied else (hidden.MOTIONS, hidden.Bench())
-    record = Record(tuple(Cycle(n, c) for n, c in enumerate(hidden.cycles(flaws, n_cycles, seed, motions, bench))))
     plant = config.load(resources.config("actuator.yaml"), Actuator)
+    told = {"case": name, "seed": seed, "version": VERSION, "motions": "varied" if varied else "test chirps"}
+    return told | examined(plant, name, values, k, n_cycles, seed, motions, bench, n_threads)
+
+
+def examined(
+    plant: Actuator, name: str, values: dict[str, float], k: list[float], n_cycles: int, seed: int,
+    motions: Any, bench: Any, n_threads: int, spoiled: Callable[[Cycle], Cycle] = lambda cycle: cycle,
+) -> dict[str, Any]:  # fmt: skip
+    """Hide a flaw, look for it, and lay what is found beside what was hidden; `spoiled` is what a recorder does."""
+    flaws = hidden.Flaws(**values, **{f"k{j + 1}": x for j, x in enumerate(k)})
+    made = enumerate(hidden.cycles(flaws, n_cycles, seed, motions, bench))
+    record = Record(tuple(spoiled(Cycle(n, c)) for n, c in made))
     begun = time.process_time()
-    told = {"case": name, "seed": seed, "version": VERSION, "hidden": values, "k": k}
+    told = {"hidden": values, "k": k}
     try:
         data = measured(plant, [record])
     except RecordError as error:
@@ -56,13 +66,13 @@ def trial(name: str, seed: int, n_cycles: int, *, varied: bool = True, n_threads
         "visible": cases.visibility(hidden, flaws, n_cycles, seed, motions, bench) if outcome == "missed" else None,
         "named": [[e["name"], *e["indistinguishable_from"]] for e in findings["effects"]],
         "confidence": [e["confidence"] for e in findings["effects"]],
-        "parameter_errors": {p: found[p]["value"] / x - 1.0 for p, x in true.items()},
+        "parameter_errors": {p: found[p]["value"] / x - 1.0 for p, x in true.items() if x},
         "z": {p: (found[p]["value"] - x) / sd[p] for p, x in true.items() if sd[p] > 0.0},
         "covered": {p: found[p]["low"] <= x <= found[p]["high"] for p, x in true.items()}, **gain["heldout"],
+        "k_after": gain["k_after"],
         "err_k_before": _err_k(gain["k_before"], k), "err_k_after": _err_k(gain["k_after"], k),
         "false_alarms": [gain["false_alarms_before"], gain["false_alarms_after"]], "cpu_s": time.process_time() - begun,
-        "motions": "varied" if varied else "test chirps", "tried": findings["tried"][:8],
-        "said": findings["structure"].get("sentences", []) + findings["notes"],
+        "tried": findings["tried"][:8], "said": findings["structure"].get("sentences", []) + findings["notes"],
     }  # fmt: skip
 
 

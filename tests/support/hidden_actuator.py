@@ -18,6 +18,36 @@ import numpy as np
 TICK = 1e-4  # [s]
 
 
+class Nominal(NamedTuple):
+    """What the finder is told of the plant: that of `config/actuator.yaml`, or another."""
+
+    R: float = 1.065  # [ohm]
+    L: float = 0.36e-3  # [H]
+    k_e: float = 0.0376  # [V s/rad]
+    p: float = 2.0
+    J: float = 2.5e-5  # [kg m²]
+    C: float = 3e-5  # [N m s/rad]
+    V: float = 48.0  # [V]
+    h: float = 0.25  # [A]
+    I_max: float = 22.5  # [A]
+    GR: float = 500.0
+    F_s: float = 0.04  # [N m]
+    F_d: float = 0.02  # [N m]
+    b: float = 1e-5  # [rad]
+    K_p: float = 6e4  # [1/s]
+    K_w: float = 0.05  # [A s/rad]
+
+
+# More than a factor of two apart in inertia, friction, inductance and gear; loops as fast as those of the first.
+PLANTS = {
+    "shipped": Nominal(),
+    "heavy": Nominal(R=0.7, L=0.8e-3, k_e=0.05, p=4.0, J=7e-5, C=8e-5, V=60.0, GR=220.0, F_s=0.1, F_d=0.06, b=2.2e-5,
+                     K_p=2.6e4, K_w=0.105),
+    "light": Nominal(R=1.9, L=0.17e-3, k_e=0.028, p=2.0, J=1.1e-5, C=1e-5, h=0.35, I_max=18.0, GR=1050.0, F_s=0.016,
+                     F_d=0.009, b=5e-6, K_p=1.26e5, K_w=0.03),
+}  # fmt: skip
+
+
 class Flaws(NamedTuple):
     """What this actuator does that the finder's nominal plant does not; zero is no flaw."""
 
@@ -75,6 +105,15 @@ class Flaws(NamedTuple):
     speed_delay: float = 0.0  # [s]
     clock_skew: float = 0.0  # the recorder's interval is longer by this share
     adc_limit: float = 30.0  # [A]
+    controller_delay: float = 0.0  # [s] of the user position, behind the recorder's tap
+    # the recorder alone: the controller sees none of it
+    recorder_gain_a: float = 0.0
+    recorder_gain_b: float = 0.0
+    recorder_gain_c: float = 0.0
+    recorder_offset_a: float = 0.0
+    recorder_offset_b: float = 0.0
+    recorder_offset_c: float = 0.0
+    recorder_delay: float = 0.0  # [s] of the user position
     # outside the library
     cushion: float = 0.0  # [N m/rad² at the user] a spring that stiffens from cushion_begin on
     cushion_begin: float = 1e-3  # [rad at the user]
@@ -102,6 +141,7 @@ class Bench(NamedTuple):
     position: float = 0.0  # [rad] at the user, around which everything moves
     user_zero: float = 0.0  # [rad] what the user's sensor shows at zero; commands are by this sensor
     command_late: int = 0  # 1: the recorder writes the state at the end of a tick beside the command of its beginning
+    nominal: Nominal = PLANTS["shipped"]
 
 
 BENCH = Bench()
@@ -117,9 +157,9 @@ class State(NamedTuple):
     u_dc: np.ndarray
 
 
-def rest(position: float = 0.0) -> State:
-    mechanics = np.array([500.0 * position, 0.0, position, 0.0])
-    return State(np.zeros(3), np.zeros((2, 3)), np.ones(3), mechanics, np.array([48.0]))
+def rest(position: float = 0.0, nominal: Nominal = BENCH.nominal) -> State:
+    mechanics = np.array([nominal.GR * position, 0.0, position, 0.0])
+    return State(np.zeros(3), np.zeros((2, 3)), np.ones(3), mechanics, np.array([nominal.V]))
 
 
 @numba.njit(cache=True)
@@ -151,11 +191,11 @@ def _loss(x):
 
 
 @numba.njit(cache=True)
-def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, link, out):
-    R, L, k_e, p, J, C = 1.065, 0.36e-3, 0.0376, 2.0, 2.5e-5 * (1.0 + f.inertia), 3e-5
-    V, h, I_max, GR, K_p, K_w = 48.0, 0.25, 22.5, 500.0, 6e4, 0.05 * (1.0 + f.speed_gain)
-    F_s, F_d = 0.04 * (1.0 + 3.0 * f.k1), 0.02 * (1.0 + 3.0 * f.k1)
-    b, stop, lsb = 1e-5 * (1.0 + 100.0 * f.k2), 0.4, 1.5e-5
+def _run(q, f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, link, out):
+    R, L, k_e, p, J, C = q.R, q.L, q.k_e, q.p, q.J * (1.0 + f.inertia), q.C
+    V, h, I_max, GR, K_p, K_w = q.V, q.h, q.I_max, q.GR, q.K_p, q.K_w * (1.0 + f.speed_gain)
+    F_s, F_d = q.F_s * (1.0 + 3.0 * f.k1), q.F_d * (1.0 + 3.0 * f.k1)
+    b, stop, lsb = q.b * (1.0 + 100.0 * f.k2), 0.4, 1.5e-5
     N = np.array([1.0 - f.k3, 1.0 - f.k4, 1.0 - f.k5])
     gains = np.array([1.0 + f.gain_a, 1.0 + f.gain_b, 1.0 + f.gain_c])
     offsets = np.array([f.offset_a, f.offset_b, f.offset_c])
@@ -189,7 +229,10 @@ def _run(f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, lin
         lower = max(math.floor(late_w), 0)
         upper = min(lower + 1, tick)
         seen_w = log_w[lower] + (max(late_w, 0.0) - lower) * (log_w[upper] - log_w[lower])
-        lag = command[tick] - seen_u
+        late_u -= f.controller_delay / T
+        lower = max(math.floor(late_u), 0)
+        upper = min(lower + 1, tick)
+        lag = command[tick] - (log_u[lower] + (max(late_u, 0.0) - lower) * (log_u[upper] - log_u[lower]))
         if f.deadband > 0.0:
             lag = 0.0 if abs(lag) < f.deadband else lag - math.copysign(f.deadband, lag)
         wanted = min(max(K_w * (K_p * lag - seen_w), -I_max), I_max)
@@ -321,7 +364,7 @@ def cycle(flaws: Flaws, command: np.ndarray, state: State, seed: int, bench: Ben
     flaws = Flaws(*(float(x) for x in flaws))
     acted = np.append(np.asarray(command, dtype=float), np.repeat(command[-1], late))
     _run(
-        *(flaws, acted, bench.lvdt_noise * rng.standard_normal(n + late)),
+        *(bench.nominal, flaws, acted, bench.lvdt_noise * rng.standard_normal(n + late)),
         *(
             bench.substeps,
             10.0 * rng.random(),
@@ -335,6 +378,12 @@ def cycle(flaws: Flaws, command: np.ndarray, state: State, seed: int, bench: Ben
         ),
     )
     out = np.ascontiguousarray(out[:, late:])
+    gain = np.array([flaws.recorder_gain_a, flaws.recorder_gain_b, flaws.recorder_gain_c])[:, None]
+    offset = np.array([flaws.recorder_offset_a, flaws.recorder_offset_b, flaws.recorder_offset_c])[:, None]
+    out[:3] = out[:3] * (1.0 + gain) + offset
+    if flaws.recorder_delay > 0.0:
+        tick = np.arange(n)
+        out[4] = np.interp(tick - flaws.recorder_delay / TICK, tick, out[4])
     i = np.clip(out[:3] + bench.current_noise * rng.standard_normal((3, n)), -flaws.adc_limit, flaws.adc_limit)
     step = 60.0 / 4096
     i = step * np.round(i / step)
@@ -386,21 +435,21 @@ def two_tones(amplitude: float, f: float, duration: float) -> np.ndarray:
 SHAPES = (chirp, sine, triangle, steps, ramps, two_tones)
 
 
-def drawn_motion(rng: np.random.Generator) -> np.ndarray:
+def drawn_motion(rng: np.random.Generator, GR: float = 500.0) -> np.ndarray:
     """Another shape, amplitude and pace: rotor speeds of 60 to 230 rad/s, amplitudes of half to four rotor turns."""
     shape = SHAPES[int(rng.integers(len(SHAPES)))]
-    amplitude = float(np.exp(rng.uniform(np.log(2e-3), np.log(2e-2))))
-    f = float(rng.uniform(60.0, 230.0)) / (2.0 * np.pi * amplitude * 500.0)
+    amplitude = float(np.exp(rng.uniform(np.log(2e-3), np.log(2e-2)))) * 500.0 / GR
+    f = float(rng.uniform(60.0, 230.0)) / (2.0 * np.pi * amplitude * GR)
     duration = max(0.5, 1.2 / f) if shape is not chirp else 0.5
     return np.round(shape(amplitude, min(f, 20.0), min(duration, 0.8)), 7)
 
 
-def drawn_motions(rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+def drawn_motions(rng: np.random.Generator, GR: float = 500.0) -> tuple[np.ndarray, ...]:
     """The test chirps, one motion only, two or three others in turn, or many that are all different."""
     kind = rng.choice(["test", "one", "some", "many"], p=[0.3, 0.2, 0.35, 0.15])
     if kind == "test":
-        return MOTIONS
-    return tuple(drawn_motion(rng) for _ in range({"one": 1, "some": int(rng.integers(2, 4)), "many": 6}[kind]))
+        return tuple(500.0 / GR * motion for motion in MOTIONS)
+    return tuple(drawn_motion(rng, GR) for _ in range({"one": 1, "some": int(rng.integers(2, 4)), "many": 6}[kind]))
 
 
 def drawn_bench(rng: np.random.Generator) -> Bench:
@@ -419,7 +468,7 @@ def cycles(
     bench: Bench = BENCH,
 ) -> list[dict[str, np.ndarray]]:
     """`n` consecutive cycles, motions in turn; between cycles the actuator is led back and comes to rest."""
-    found, state = [], rest(bench.position)
+    found, state = [], rest(bench.position, bench.nominal)
     _ = cycle(flaws, np.full(500, bench.position), state, 1000 * seed + 999, bench)
     for number in range(n):
         command = bench.position + motions[number % len(motions)]

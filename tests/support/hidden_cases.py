@@ -136,6 +136,16 @@ CASES: dict[str, Case] = {
     "adc_saturation": Case(_one("adc_limit", 4.0, 6.0), ("adc_saturation",),
                            parameters={"adc_saturation.limit": lambda f: f["adc_limit"]}),
     "winding_resistance": Case(_one("resistance", 0.1, 0.4), ("winding_resistance",)),
+    "recorder_gain": Case(
+        _several(0.04, "recorder_gain_a", "recorder_gain_b", "recorder_gain_c"), ("recorder_gain",),
+        parameters={f"recorder_gain.gain_{j}": lambda f, j=j: f[f"recorder_gain_{j}"] for j in "abc"}),
+    "recorder_offset": Case(
+        _several(0.1, "recorder_offset_a", "recorder_offset_b", "recorder_offset_c"), ("recorder_offset",),
+        parameters={f"recorder_offset.offset_{j}": lambda f, j=j: f[f"recorder_offset_{j}"] for j in "abc"}),
+    "recorder_delay": Case(_one("recorder_delay", 3e-4, 1.5e-3), ("recorder_delay",),
+                           parameters={"recorder_delay.time": lambda f: f["recorder_delay"]}),
+    "controller_delay": Case(_one("controller_delay", 3e-4, 1.5e-3), ("controller_delay",),
+                             parameters={"controller_delay.time": lambda f: f["controller_delay"]}),
     "torque line 7.37": Case(_one("line", 0.004, 0.015), outside=True),
     "intermittent drag": Case(_one("drag", 0.005, 0.015), outside=True),
     "dead band": Case(_one("deadband", 5e-5, 2e-4), outside=True),
