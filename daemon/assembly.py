@@ -35,7 +35,8 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     codec = default()
     bundles = load_bundles(settings)
     monitor = Monitor(bundles, codec, settings.monitor)
-    local = Runner(bundles).run
+    local = Runner(bundles, [method for method in settings.monitor.slower if method not in settings.remote]).run
+    bundles = {number: bundle.essence for number, bundle in bundles.items()}  # identifiers have what they need
     watch = settings.supervision
     remote = {
         method: RemoteRunner(path, bundles, patience=watch.budget(method)) for method, path in settings.remote.items()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import sys
 import time
 from collections.abc import Iterable, Mapping
@@ -30,6 +29,7 @@ from ema.monitor import (
 
 from .arrival import Arrival
 from .health import Health
+from .memory import settle
 from .notify import notify
 from .sinks import BusSink, LogSink
 from .supervision import LOOK, SupervisionSettings
@@ -94,8 +94,7 @@ class Service:
         """Run until stopped; then finish what is begun."""
         started = next_beat = next_look = time.monotonic()
         self._event(Level.INFO, "started", self._port.choice)
-        gc.collect()
-        gc.freeze()  # the garbage collector need not look through all that start-up has made, in the middle of a cycle
+        settle()
         sys.setswitchinterval(_SWITCH)
         notify("READY=1")
         while not self._stopping:

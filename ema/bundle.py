@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import shutil
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -124,6 +124,12 @@ class Bundle:
     def sampler(self) -> Sampler:
         """Takes measurements at the schedule; one for all actuators of this bundle."""
         return Sampler(self.plant, self.schedule)
+
+    @cached_property
+    def essence(self) -> Bundle:
+        """The bundle without what identifiers are made from: manifest, schedule and what `nuisance` needs."""
+        needed = {"schedule", "A", "noise_switching", *NUISANCE_SHAPES}
+        return replace(self, arrays={name: array for name, array in self.arrays.items() if name in needed})
 
     def lf2(self) -> Lf2:
         """The LF2 library over the whole cycle."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -14,24 +14,32 @@ from .outputs import Job, Output
 
 
 class Runner:
-    """Runs jobs; makes each identifier when it is first asked for.
+    """Runs jobs; makes each identifier when it is first asked for, one for all actuators of a bundle.
 
     Parameters
     ----------
     bundles : mapping of actuator number to Bundle
+    methods : names
+        Identifiers that are made at once. Given any, there are no others, and the bundles are not kept.
     """
 
-    def __init__(self, bundles: Mapping[int, Bundle]):
-        self._bundles = bundles
+    def __init__(self, bundles: Mapping[int, Bundle], methods: Collection[str] = ()):
         self._identifiers: dict[tuple[str, int], Identifier] = {}
+        self._keys = {number: id(bundle) for number, bundle in bundles.items()}
+        self._bundles = {id(bundle): bundle for bundle in bundles.values()}
+        for key in [(method, one) for method in methods for one in self._bundles]:
+            self._made(*key)
+        if methods:
+            self._bundles = {}
 
     def run(self, job: Job) -> Estimate:
         """The estimate a job asks for."""
-        bundle = self._bundles[job.actuator]
-        key = job.method, id(bundle)
-        if key not in self._identifiers:
-            self._identifiers[key] = identifier(job.method, bundle)
-        return self._identifiers[key].estimate(job.measurement)
+        return self._made(job.method, self._keys[job.actuator]).estimate(job.measurement)
+
+    def _made(self, method: str, key: int) -> Identifier:
+        if (method, key) not in self._identifiers:
+            self._identifiers[method, key] = identifier(method, self._bundles[key])
+        return self._identifiers[method, key]
 
 
 def answered(outputs: Iterable[Output], monitor: Monitor, runner: Runner) -> Iterator[Output]:

@@ -34,6 +34,11 @@ def test_exposure(unit, capsys):
     assert details, "systemd-analyze judged nothing"
 
 
+@pytest.mark.parametrize("unit", UNITS)
+def test_no_core_file_holds_a_key(unit):
+    assert "LimitCORE=0" in resources.systemd(unit).read_text().splitlines()
+
+
 @needs_systemd_analyze
 @pytest.mark.parametrize("unit", UNITS)
 def test_unit_is_understood(unit, tmp_path):
