@@ -13,8 +13,9 @@ from ema.bus.codec import Codec
 from ema.bus.protection import Counts
 from ema.core.errors import ConfigError
 from ema.core.names import FAULTS
-from ema.core.status import Reason, Status
+from ema.core.status import IMPLAUSIBLE, Reason, Status
 from ema.identification import METHODS, Estimate, Identifier, identifier
+from ema.identification.fit import not_estimated
 from ema.identification.noise import NoiseModel
 
 from .doubt import ModelDoubt
@@ -118,7 +119,10 @@ class Monitor:
 
     def _answer(self, job: Job) -> Iterator[Output]:
         channel = self._channels[job.actuator]
-        estimate = channel.shared.identifier.estimate(job.measurement)
+        if job.reasons & IMPLAUSIBLE:  # whatever it says would be of the sensor
+            estimate = not_estimated(FIRST, job.measurement, Reason(0))
+        else:
+            estimate = channel.shared.identifier.estimate(job.measurement)
         outputs = list(self._concluded(job, estimate))
         self.n_cycles += 1
         usable = any(isinstance(o, Identified) and o.estimate.status <= Status.DEGRADED for o in outputs)
@@ -133,6 +137,8 @@ class Monitor:
         changed = doubt.update(job.cycle, estimate.p_value)
         reasons = self._reasons(job, estimate)
         status = max(estimate.status, Status.DEGRADED if reasons & _DEGRADING else Status.VALID)
+        if reasons & IMPLAUSIBLE:
+            status = Status.INVALID
         yield Identified(job.t_ns, job.actuator, job.cycle, replace(estimate, status=status, reasons=reasons))
         if changed:
             yield _judgement(job, doubt, not self._has_last_word(job.method))

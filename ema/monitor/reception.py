@@ -17,6 +17,7 @@ from ema.core.status import Reason
 from .assembler import Assembler
 from .cycles import AssembledCycle
 from .outputs import FIRST, Event, Job
+from .plausibility import Plausibility
 from .settings import MonitorSettings
 
 
@@ -32,6 +33,7 @@ class Reception:
 
     def __init__(self, bundles: Mapping[int, Bundle], codec: Codec, settings: MonitorSettings):
         self._samplers = {number: bundle.sampler for number, bundle in bundles.items()}
+        self._plausibilities = {number: Plausibility(bundle.plant) for number, bundle in bundles.items()}
         self._assembler = Assembler(codec, {number: b.plant for number, b in bundles.items()}, settings)
 
     @property
@@ -65,4 +67,5 @@ class Reception:
         reasons = seen.reasons
         if sampler.saturated(seen.i):
             reasons |= Reason.SATURATED
+        reasons |= self._plausibilities[seen.actuator].reasons(seen.i, seen.missing, motion)
         return Job(seen.t_ns, seen.actuator, seen.span.cycle, FIRST, measurement, reasons)
