@@ -9,16 +9,20 @@ from pathlib import Path
 
 import yaml
 
+from ema.alarms.bus import COMMAND
 from ema.bundle import Bundle
-from ema.bus.codec import default
+from ema.bus.codec import Codec, default
 from ema.bus.interface import open_bus
+from ema.core.config import Settings
 from ema.log import LogSettings, LogWriter
 from ema.monitor import Monitor, Runner
 
+from .alarming import AlarmDesk
 from .health import Health
 from .remote import RemoteRunner
 from .service import Service
-from .settings import DaemonSettings, load_bundles
+from .settings import DaemonSettings, load_alarms, load_bundles
+from .state_file import StateFile
 from .supervision import promised
 from .worker import Worker
 
@@ -34,6 +38,7 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     """
     codec = default()
     bundles = load_bundles(settings)
+    alarm_settings = load_alarms(settings)
     monitor = Monitor(bundles, codec, settings.monitor)
     local = Runner(bundles, [method for method in settings.monitor.slower if method not in settings.remote]).run
     bundles = {number: bundle.essence for number, bundle in bundles.items()}  # identifiers have what they need
@@ -43,13 +48,17 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     }
     attachments: dict[str, bytes | Path] = {
         codec.path.name: codec.path,
-        "daemon.yaml": yaml.safe_dump(settings.model_dump(mode="json"), allow_unicode=True, sort_keys=False).encode(),
+        "daemon.yaml": _yaml(settings),
+        "alarms.yaml": _yaml(alarm_settings),
         **_manifests(bundles),
     }
     log_settings = LogSettings(**settings.log.model_dump(exclude={"directory"}))
     with ExitStack() as stack:
         log = stack.enter_context(LogWriter(settings.log.directory, attachments, log_settings))
-        port = stack.enter_context(open_bus(settings.bus, codec.filters("Actuator"), role="Monitor"))
+        port = stack.enter_context(open_bus(settings.bus, _heard(codec), role="Monitor"))
+        state = StateFile(Path(settings.alarms.state or Path(settings.log.directory) / "alarms.json"))
+        stack.enter_context(state)
+        desk = AlarmDesk(alarm_settings, bundles, codec, port, log, state)
         for runner in remote.values():
             stack.callback(runner.close)
         workers = {
@@ -64,7 +73,16 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
         supervisor = promised(bundles, every, remote, watch)
         answering = {method: runner.answers for method, runner in remote.items()}
         health = Health(monitor, port, log, supervisor, answering)
-        yield Service(monitor, port, log, codec, workers, settings.pace, health, watch)
+        yield Service(monitor, port, log, codec, workers, settings.pace, health, watch, desk)
+
+
+def _heard(codec: Codec) -> list[tuple[int, int]]:
+    """Filters of what the monitor listens to: actuators, and operators' commands with their seals."""
+    return [*codec.filters("Actuator"), *codec.filters_of(COMMAND, "TesterSeal", "TesterSession")]
+
+
+def _yaml(settings: Settings) -> bytes:
+    return yaml.safe_dump(settings.model_dump(mode="json"), allow_unicode=True, sort_keys=False).encode()
 
 
 def _manifests(bundles: dict[int, Bundle]) -> dict[str, bytes]:

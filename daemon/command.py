@@ -28,9 +28,11 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
     from ema.core.errors import EmaError, Failure
     from ema.core.stopping import on_stop
 
+    from .journal import use_journal
     from .settings import load
 
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(message)s")
+    use_journal()
     settings = load(config_path)
     if bus is not None:
         settings = settings.model_copy(update={"bus": interface.elsewhere(settings.bus, bus)})

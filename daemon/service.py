@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from ema.alarms import Command, in_order
 from ema.bus.codec import Codec
 from ema.bus.port import MAX_BATCH, Port
 from ema.core.frames import joined, overflow_notice
@@ -27,6 +28,7 @@ from ema.monitor import (
     Verdict,
 )
 
+from .alarming import AlarmDesk
 from .arrival import Arrival
 from .health import Health
 from .memory import settle
@@ -60,6 +62,7 @@ class Service:
         a cycle's end they are taken as they come, and all work that can wait does, so that its answer is early. [s]
     health : Health
     watch : SupervisionSettings
+    desk : AlarmDesk
     """
 
     def __init__(
@@ -72,14 +75,15 @@ class Service:
         pace: float,
         health: Health,
         watch: SupervisionSettings,
+        desk: AlarmDesk,
     ):
         self._monitor, self._port, self._log = monitor, port, log
         self._bus_sink, self._log_sink = BusSink(port, codec), LogSink(log)
         self._workers, self._pace = workers, pace
-        self._health = health
+        self._health, self._desk = health, desk
         self._arrival, self._timeliness = Arrival(), Timeliness(watch.budget)
         self._near = _PACES * pace
-        self._later: list[Output | Verdict] = []  # answers of which the rest of the work is left to do
+        self._later: list[Output | Verdict | Command] = []  # answers of which the rest of the work is left to do
         self._later_ns = 0  # time of the first of them
         self._drops = 0
         self._asked_ns = 0  # time of the cycle that the arbiter has been asked about for longest
@@ -94,6 +98,7 @@ class Service:
         """Run until stopped; then finish what is begun."""
         started = next_beat = next_look = time.monotonic()
         self._event(Level.INFO, "started", self._port.choice)
+        self._desk.start(time.time_ns())
         settle()
         sys.setswitchinterval(_SWITCH)
         notify("READY=1")
@@ -126,7 +131,7 @@ class Service:
         self._arrival.note(frames, time.time_ns(), time.monotonic())
         self._log.frames(frames, self._port.name)
         self._settle(int(frames["t_ns"][-1]))
-        self._put(self._monitor.stream(frames))
+        self._put(in_order(self._desk.hear(frames), self._monitor.stream(frames)))
 
     def _settle(self, t_ns: int) -> None:
         """Have the arbiter's answer to a cycle before the next cycle: it decides how that is marked, live as in replay.
@@ -147,12 +152,14 @@ class Service:
             time.sleep(1e-3)
         self._stuck = not worker.idle
 
-    def _put(self, outputs: Iterable[Output]) -> None:
+    def _put(self, outputs: Iterable[Output | Command]) -> None:
         """Every estimate onto the bus as soon as it is there; the rest of the work is left for later."""
         for out in outputs:
             if not self._later:
                 self._later_ns = out.t_ns
-            self._later.append(self._send(out) if isinstance(out, Identified) else out)
+            if isinstance(out, Identified):
+                self._later.append(self._send(out))
+            self._later.append(out)
 
     def _work_off(self) -> None:
         """What is to be done with answers that are on the bus: log them, hand on their jobs."""
@@ -162,6 +169,10 @@ class Service:
                 self._log_sink.estimate(item.out, item.age)
                 if item.event:
                     self._log_sink.event(item.event)
+            elif isinstance(item, Identified):
+                self._desk.estimate(item)  # as the monitor made it, so that a replay gives the same alarms
+            elif isinstance(item, Command):
+                self._desk.command(item)
             elif isinstance(item, SampledEnvelope):
                 self._log_sink.envelope(item)
             elif isinstance(item, Event):
@@ -216,7 +227,8 @@ class Service:
     def _send_beat(self, uptime: float, now_ns: int) -> None:
         health = self._health
         self._bus_sink.heartbeat(health.heartbeat(uptime), health.supervision(), now_ns)
-        self._log_sink.status(health.state, uptime, health.counters, health.supervisor.ordered, now_ns)
+        lapses = health.supervisor.ordered
+        self._desk.beat(self._log_sink.status(health.state, uptime, health.counters, lapses, now_ns))
 
     def _finish(self, uptime: float) -> None:
         self._put(self._monitor.finish())
@@ -227,6 +239,7 @@ class Service:
         self._health.beat(time.time_ns())
         self._health.state = ServiceState.STOPPING
         self._send_beat(uptime, time.time_ns())
+        self._desk.close()
         self._event(Level.INFO, "stopped", f"stopped after {uptime:.1f} s, {self._monitor.n_cycles} cycles")
 
     def _event(self, level: Level, code: str, text: str) -> None:

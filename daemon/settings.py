@@ -7,12 +7,13 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from ema.alarms import AlarmSettings
 from ema.bundle import Bundle
 from ema.bundle import load as load_bundle
 from ema.bus import codec
 from ema.bus.identifiers import N_ACTUATORS
 from ema.bus.interface import BusSettings
-from ema.core import config
+from ema.core import config, resources
 from ema.core.config import Settings
 from ema.core.errors import BundleError
 from ema.core.units import quantity
@@ -41,6 +42,13 @@ class LogSection(LogSettings):
     directory: str = Field(min_length=1, description="must exist; relative to the configuration's folder")
 
 
+class AlarmSection(Settings):
+    """Where thresholds come from, and where the states of alarms are kept."""
+
+    file: str | None = Field(default=None, description="alarms.yaml, relative to the configuration; absent: as shipped")
+    state: str | None = Field(default=None, description="state file; absent: alarms.json in the log's directory")
+
+
 class DaemonSettings(Settings):
     """The whole configuration."""
 
@@ -48,6 +56,7 @@ class DaemonSettings(Settings):
     actuators: dict[Number, ActuatorSettings] = Field(min_length=1, description="by number on the bus")
     log: LogSection
     monitor: MonitorSettings = MonitorSettings()
+    alarms: AlarmSection = AlarmSection()
     remote: dict[str, str] = Field(
         default_factory=dict, description="identifiers in a process of their own (`ema hf-worker`): its Unix socket"
     )
@@ -88,12 +97,23 @@ def load(path: Path) -> DaemonSettings:
         for number, one in settings.actuators.items()
     }
     log = settings.log.model_copy(update={"directory": str(folder / settings.log.directory)})
+    alarms = AlarmSection(
+        file=settings.alarms.file and str(folder / settings.alarms.file),
+        state=str(folder / settings.alarms.state) if settings.alarms.state else None,
+    )
     remote = {method: str(folder / socket) for method, socket in settings.remote.items()}
     key_file, session_file = settings.bus.key_file, settings.bus.session_file
     bus = settings.bus.model_copy(
         update={"key_file": key_file and folder / key_file, "session_file": session_file and folder / session_file}
     )
-    return settings.model_copy(update={"bus": bus, "actuators": actuators, "log": log, "remote": remote})
+    return settings.model_copy(
+        update={"bus": bus, "actuators": actuators, "log": log, "alarms": alarms, "remote": remote}
+    )
+
+
+def load_alarms(settings: DaemonSettings) -> AlarmSettings:
+    """The thresholds; those shipped where the configuration names no file."""
+    return config.load(settings.alarms.file or resources.config("alarms.yaml"), AlarmSettings)
 
 
 def load_bundles(settings: DaemonSettings) -> dict[int, Bundle]:

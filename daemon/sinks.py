@@ -102,7 +102,9 @@ class LogSink:
 
     def status(
         self, state: ServiceState, uptime: float, counters: dict[str, int], lapses: Iterable[Promise], t_ns: int
-    ) -> None:
-        """A copy of the heartbeat."""
+    ) -> dict[str, Any]:
+        """A copy of the heartbeat, which is returned as logged."""
         log = self._log
-        self._log.status(contents.status(t_ns, state, uptime, log.state, log.free_bytes, counters, lapses))
+        content = contents.status(t_ns, state, uptime, log.state, log.free_bytes, counters, lapses)
+        log.status(content)
+        return content

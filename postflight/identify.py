@@ -7,11 +7,14 @@ from collections.abc import Iterator, Set
 from dataclasses import dataclass
 
 import click
+import yaml
 
+from ema.alarms import AlarmSettings, Command
 from ema.bundle import Bundle
 from ema.bundle import load as load_bundle
 from ema.bus import codec as codecs
 from ema.bus import identifiers
+from ema.core import config
 from ema.core.errors import BundleError, LogError
 from ema.log import LogReader, Message, contents, schemas
 from ema.log.schemas import Encoded
@@ -31,6 +34,7 @@ from ema.monitor import (
 )
 from ema.monitor.recorded import configuration, monitor_settings
 
+from .alarms_again import AlarmsAgain
 from .open_log import names
 from .received import Log, received, received_beside, worth_a_process
 
@@ -49,11 +53,14 @@ class Setup:
         Those of the log, or the defaults.
     same : bool
         Whether every bundle is the one that the log was made with.
+    alarms : AlarmSettings or None
+        Those of the log; None where it was made without alarms.
     """
 
     bundles: dict[int, Bundle]
     settings: MonitorSettings
     same: bool
+    alarms: AlarmSettings | None = None
 
 
 def setup(log: Log, given: tuple[str, ...]) -> Setup:
@@ -86,13 +93,14 @@ def setup(log: Log, given: tuple[str, ...]) -> Setup:
                 f"{paths[n]}: is not the bundle that the log was made with, it has been built again; "
                 f"to compare the two, name it with --bundle"
             )
-    return Setup(bundles, monitor_settings(configured), len(same) == len(numbers) and all(same.values()))
+    is_same = len(same) == len(numbers) and all(same.values())
+    return Setup(bundles, monitor_settings(configured), is_same, _alarm_settings(attached))
 
 
 def identified(
     log: Log, how: Setup, channels: tuple[str, ...] = (), n_processes: int | None = None
 ) -> Iterator[Encoded | Message]:
-    """The monitor's answers to all frames as the daemon would log them, and between them the estimates it logged.
+    """The monitor's answers to all frames as the daemon would log them, and between them the ones it logged.
 
     Memory does not grow with the log.
 
@@ -106,7 +114,7 @@ def identified(
     Encoded
         An answer.
     Message
-        An estimate in the log.
+        An estimate, or a change of an alarm, in the log.
 
     Raises
     ------
@@ -117,12 +125,29 @@ def identified(
     monitor, runner = Monitor(how.bundles, codecs.default(), how.settings), Runner(how.bundles)
     told = _told(log) if isinstance(log, LogReader) else {}
     left_out = {key for key, codes in told.items() if codes & set(LostJob)}
+    alarms = AlarmsAgain(how.alarms, how.bundles)
     for item in (received_beside if beside else received)(log, how.bundles, how.settings, channels):
         if isinstance(item, Message):
-            yield item
+            yield from alarms.logged(item)
+            if item.topic.startswith("/estimate/") or (item.topic == schemas.ALARM.topic and alarms.follows):
+                yield item
+        elif isinstance(item, Command):
+            yield from alarms.command(item)
         else:
             outputs = (o for o in monitor.judge([item]) if not (isinstance(o, Job) and _job(o) in left_out))
-            yield from (_encoded(_as_sent(out, told)) for out in answered(outputs, monitor, runner))
+            for out in answered(outputs, monitor, runner):
+                yield _encoded(_as_sent(out, told))
+                yield from alarms.answer(out)
+
+
+def _alarm_settings(attached: dict[str, bytes]) -> AlarmSettings | None:
+    text = attached.get("alarms.yaml")
+    if text is None:
+        return None
+    try:
+        return config.validate(yaml.safe_load(text), AlarmSettings, "alarms.yaml in the log")
+    except (yaml.YAMLError, ValueError) as error:
+        raise LogError("alarms.yaml in the log is damaged") from error
 
 
 def _job(job: Job) -> _Key:

@@ -14,6 +14,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NamedTuple
 
+from ema.alarms import Command, in_order
+from ema.alarms.bus import CommandListener
 from ema.bundle import Bundle
 from ema.bus import codec as codecs
 from ema.core.errors import EmaError, LogError
@@ -28,21 +30,23 @@ LONG = 30_000_000  # below this a second process takes longer to start than it s
 _TOGETHER = 16  # items sent at once
 
 Log = LogReader | ForeignLog
-Item = Job | Event | Message
+Item = Job | Event | Message | Command
 
 
 def received(
     log: Log, bundles: Mapping[int, Bundle], settings: MonitorSettings, channels: tuple[str, ...]
 ) -> Iterator[Item]:
-    """Cycles as jobs, events of their assembly, and the estimates in the log, in the order of the log.
+    """Cycles as jobs, events of their assembly, operators' commands, and what the daemon logged, in the log's order.
+
+    Of what it logged: estimates, alarms, and its own state.
 
     Raises
     ------
     LogError
         The frames are of several channels, and none was chosen.
     """
-    reception = Reception(bundles, codecs.default(), settings)
-    wanted = (schemas.FRAMES.topic, "/estimate/")
+    reception, listener = Reception(bundles, codecs.default(), settings), CommandListener(codecs.default(), bundles)
+    wanted = (schemas.FRAMES.topic, "/estimate/", schemas.ALARM.topic, schemas.STATUS.topic)
     entries = log.entries(lambda topic: topic.startswith(wanted)) if isinstance(log, LogReader) else log.frames()
     only = ""
     for entry in entries:
@@ -54,7 +58,7 @@ def received(
                 raise LogError(
                     f"{names(log.paths)}: frames of channels '{only}' and '{entry.bus}': choose one by --channel"
                 )
-            yield from reception.feed(entry.frames)
+            yield from in_order(listener.hear(entry.frames), reception.feed(entry.frames))
     yield from reception.finish()
 
 

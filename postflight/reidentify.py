@@ -15,15 +15,17 @@ from ema.core.errors import LogError, NegativeAnswer
 from ema.core.names import FAULTS
 from ema.core.version import version
 from ema.log import LogReader, Message
-from ema.log.schemas import ESTIMATE
+from ema.log.schemas import ALARM, ESTIMATE
 from ema.log.segment import Segment
 
+from .alarms_again import AlarmComparison
 from .compare import Comparison, Pair, Totals
 from .identify import Setup, identified, setup
 from .open_log import names
 from .received import Log
 
 _COMMIT_EVERY = 1000  # messages
+_ALARMS = ("changes of alarms equal to the log's", "only in the log", "only now")
 
 
 def run(
@@ -42,21 +44,32 @@ def run(
         table = _CycleTable(cycles, opened) if cycles else None
         comparison = Comparison(table.write if table else lambda pair: None)
         target = _Target(out, log, how, opened) if out else None
+        alarms = AlarmComparison()
         for item in identified(log, how, channels, n_processes):
             if isinstance(item, Message):
-                comparison.logged(item.content)
+                (alarms if item.topic == ALARM.topic else comparison).logged(item.content)
                 continue
             if target:
                 target.add(item)
             if item.kind is ESTIMATE:
                 comparison.again(json.loads(item.data))
+            elif item.kind is ALARM:
+                alarms.again(json.loads(item.data))
         comparison.finish()
     seconds = time.monotonic() - started
     if not comparison.totals:
         raise LogError(f"{names(log.paths)}: no cycle of a monitored actuator in it")
-    click.echo(json.dumps(_answer(comparison, how), indent=2) if as_json else _text(comparison, how, seconds))
+    if as_json:
+        click.echo(json.dumps(_answer(comparison, how) | {"alarms": alarms.counts}, indent=2))
+    else:
+        click.echo(_text(comparison, how, seconds))
+        click.echo(", ".join(f"{n} {words}" for n, words in zip(alarms.counts.values(), _ALARMS, strict=True)))
     for damage in getattr(log, "damage", []):
         click.echo(f"{damage}", err=True)
+    if how.same and not comparison.n_different and alarms.n_different:
+        raise NegativeAnswer(
+            f"{alarms.n_different} changes of alarms have no equal in the log, though the bundle is the same"
+        )
     if how.same and comparison.n_different:
         largest = max(float(t.largest.max()) for t in comparison.totals.values())
         made_by = log.metadata().get("software", "an unknown version") if isinstance(log, LogReader) else ""

@@ -40,6 +40,12 @@ class Judged(NamedTuple):
     status: Status
     reasons: Reason
 
+    @classmethod
+    def of(cls, out: Any) -> Judged:
+        """Of the monitor's answer (`ema.monitor.Identified`), as it made it: not what became of it on its way out."""
+        e = out.estimate
+        return cls(out.t_ns, out.actuator, out.cycle, e.k, e.sd, e.status, e.reasons)
+
 
 class Alarms:
     """Points of every cause for each actuator, and for the monitor itself.
@@ -147,7 +153,8 @@ class Alarms:
 
     def _judge(self, key: _Key, level: AlarmLevel, measure: Measure, t_ns: int) -> list[Change]:
         self._measures[key] = measure
-        cycle = self._cycles.get(key[0], 0) if key[0] is not None else 0
+        # of supervision there is no cycle: heartbeats and cycles are not in step
+        cycle = 0 if key[0] is None or _is_supervised(key) else self._cycles.get(key[0], 0)
         return self._changed(key, t_ns, lambda point: point.judge(level, cycle, t_ns))
 
     def _command(self, command: Command, t_ns: int) -> list[Change]:

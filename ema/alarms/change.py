@@ -42,7 +42,7 @@ def said(change: Change) -> str:
     parts = [change.state.name.lower().replace("_", "-")]
     if change.level:
         parts += [measured(cause, change.measure)] if measured(cause, change.measure) else []
-        parts.append(f"since cycle {change.since_cycle}")
+        parts += [f"since cycle {change.since_cycle}"] if cause.kind is not Kind.SUPERVISION else []
     return f"{head}: {', '.join(parts)}"
 
 

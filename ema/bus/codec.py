@@ -121,6 +121,10 @@ class Codec:
         """Filters for `open_bus` that let through what this node of the DBC sends, for any actuator."""
         return [(m.frame_id, identifiers.MESSAGE_MASK) for m in self.messages.values() if m.sender == sender]
 
+    def filters_of(self, *names: str) -> list[tuple[int, int]]:
+        """The same for single messages by their names."""
+        return [(self.messages[name].frame_id, identifiers.MESSAGE_MASK) for name in names]
+
     def split(self, frames: np.ndarray) -> Iterator[tuple[Message, np.ndarray]]:
         """The messages in a batch, each with its frames in order; foreign and refused frames are left out."""
         ids = identifiers.message_id(frames["id"])

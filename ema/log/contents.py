@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ema.core.status import Lapse, LogState, Reason, ServiceState, Status
+from ema.core.status import AlarmLevel, AlarmState, Lapse, LogState, Reason, ServiceState, Status
 
 
 class NuisanceLike(Protocol):
@@ -114,6 +114,45 @@ def envelope(
 def event(t_ns: int, level: str, code: str, text: str, actuator: int | None = None) -> dict[str, Any]:
     """Content of `schemas.EVENT`; `level` is info, warning or error, `code` a short name of the kind of event."""
     return {"t_ns": int(t_ns), "level": level, "code": code, "text": text, "actuator": actuator}
+
+
+class AlarmLike(Protocol):
+    """What is logged of an alarm (`ema.alarms.Change`)."""
+
+    @property
+    def t_ns(self) -> int: ...  # noqa: D102
+    @property
+    def actuator(self) -> int | None: ...  # noqa: D102
+    @property
+    def cause(self) -> str: ...  # noqa: D102
+    @property
+    def level(self) -> AlarmLevel: ...  # noqa: D102
+    @property
+    def state(self) -> AlarmState: ...  # noqa: D102
+    @property
+    def since_cycle(self) -> int: ...  # noqa: D102
+    @property
+    def since_ns(self) -> int: ...  # noqa: D102
+    @property
+    def measure(self) -> tuple[float, float, float, float]: ...  # noqa: D102
+    @property
+    def shelved_until_ns(self) -> int: ...  # noqa: D102
+
+
+def alarm(change: AlarmLike, text: str) -> dict[str, Any]:
+    """Content of `schemas.ALARM`; `text` is one line for a person."""
+    return {
+        "t_ns": change.t_ns,
+        "actuator": change.actuator,
+        "cause": change.cause,
+        "level": change.level.name.lower(),
+        "state": change.state.name.lower(),
+        "since_cycle": change.since_cycle,
+        "since_ns": change.since_ns,
+        **dict(zip(("value", "low", "high", "limit"), change.measure, strict=True)),
+        "shelved_until_ns": change.shelved_until_ns,
+        "text": text,
+    }
 
 
 def status(

@@ -10,7 +10,7 @@ import json
 from typing import Any, NamedTuple
 
 from ema.core.names import FAULTS
-from ema.core.status import Lapse, LogState, Reason, ServiceState, Status
+from ema.core.status import AlarmLevel, AlarmState, Lapse, LogState, Reason, ServiceState, Status
 
 METHODS = ("linear", "lf2", "hf")  # identifiers that the daemon runs
 ACTUATORS = 64
@@ -171,6 +171,36 @@ EVENT = Kind(
         "text": {"type": "string", "description": "one line for a person"},
         "actuator": _or_null(_ACTUATOR),
     },
+)
+
+ALARM = Kind(
+    "ema.Alarm",
+    "/alarm",
+    "An alarm as it is after a change; the words are those of ISA-18.2.",
+    {
+        "t_ns": _T_NS,
+        "actuator": _or_null(
+            _integer("actuator number, null for the monitor itself", minimum=0, maximum=ACTUATORS - 1)
+        ),
+        "cause": {"type": "string", "description": "what it is about: k1 … k6, k1_rate …, k1_life …, model_in_doubt …"},
+        "level": _choice("how urgent", [level.name.lower() for level in AlarmLevel]),
+        "state": _choice("state of the alarm", [state.name.lower() for state in AlarmState]),
+        "since_cycle": _CYCLE,
+        "since_ns": _integer("when the condition of this level came, ns since the Unix epoch", minimum=0),
+        "value": _or_null(_number("what is judged: k [1], its rate [1/h], or the time to its alarm level [h]")),
+        "low": _or_null(_number("lower end of its interval; of remaining life the earlier")),
+        "high": _or_null(_number("upper end of its interval; null: there is none")),
+        "limit": _or_null(_number("setpoint of the level")),
+        "shelved_until_ns": _integer("end of shelving, ns since the Unix epoch; 0: not shelved", minimum=0),
+        "text": {"type": "string", "description": "one line for a person"},
+    },
+)
+
+ALARM_STATE = Kind(
+    "ema.AlarmState",
+    "/alarm/state",
+    "Everything the alarms go on from, when the monitor starts; with it a replay gives the same changes.",
+    {"t_ns": _T_NS, "snapshot": {"type": "object", "description": "as in the state file (docs/alarms.md)"}},
 )
 
 STATUS = Kind(

@@ -121,6 +121,14 @@ class LogWriter(Closing):
         """Log one event (`schemas.EVENT`)."""
         self._message(schemas.EVENT, content)
 
+    def alarm(self, content: dict[str, Any]) -> None:
+        """Log a change of an alarm (`schemas.ALARM`)."""
+        self._message(schemas.ALARM, content)
+
+    def alarm_state(self, content: dict[str, Any]) -> None:
+        """Log what the alarms go on from (`schemas.ALARM_STATE`)."""
+        self._message(schemas.ALARM_STATE, content)
+
     def status(self, content: dict[str, Any]) -> None:
         """Log a copy of the heartbeat (`schemas.STATUS`)."""
         self._message(schemas.STATUS, content)

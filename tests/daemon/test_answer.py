@@ -8,9 +8,9 @@ import threading
 
 import numpy as np
 import pytest
+from desks import loop
 from ema_daemon.answer import pack_answer, unpack_answer
 from ema_daemon.remote import RemoteRunner
-from ema_daemon.service import Service
 from ema_daemon.wire import WireError, fingerprint
 from ema_daemon.worker import Worker
 from hypothesis import HealthCheck, given, settings
@@ -138,9 +138,8 @@ def test_the_daemon_goes_on_beside_a_worker_that_lies(genuine, coarse_bundle, fl
 
     batches = [part for frames in flight for part in (frames, answered)]
     worker = Worker(remote.run, 8, "lf2")
-    with LogWriter(tmp_path) as log:
-        port = scripted(batches, lambda: service.stop())
-        service = Service(monitor, port, log, codecs.default(), {"lf2": worker}, pace=0.0)
+    port = scripted(batches, lambda: service.stop())
+    with LogWriter(tmp_path) as log, loop(monitor, port, log, {"lf2": worker}, tmp_path) as service:
         service.run()
     remote.close()
     liar.join(10)

@@ -7,8 +7,8 @@ import threading
 import cantools
 import numpy as np
 import pytest
+from desks import loop
 from ema_daemon.answer import pack_answer, unpack_answer
-from ema_daemon.service import Service
 from ema_daemon.wire import fingerprint
 from ema_daemon.worker import Worker
 from ema_postflight.live import Live
@@ -42,8 +42,7 @@ def ran(flux_bundle, flight, tmp_path_factory):
     monitor = Monitor(bundles, codecs.default(), settings)
     worker = Worker(Runner(bundles).run, 8, "lf2")
     port = ScriptedPort([flight[i : i + 100] for i in range(0, flight.size, 100)], lambda: service.stop())
-    with LogWriter(folder) as log:
-        service = Service(monitor, port, log, codecs.default(), {"lf2": worker}, pace=0.0)
+    with LogWriter(folder) as log, loop(monitor, port, log, {"lf2": worker}, folder) as service:
         service.run()
     assert threading.active_count() < 10
     return port, folder
