@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -130,24 +130,10 @@ class Search:
         for w in [w for w in self.ranked[:LEADERS] if best - w.log_evidence < BEHIND]:
             for move in moves(w.hypothesis, self.problem.causes, self.budget.at_most):
                 if move.key not in self.found:
-                    ranked.append((self.promise(w, move), move))
+                    ranked.append((self.scale.promise(w, move.causes), move))
         ranked.sort(key=lambda entry: -entry[0])
         sets = list(dict.fromkeys(move.key for _, move in ranked))[: self.budget.width]
         return [move for _, move in ranked if move.key in sets]
-
-    def promise(self, w: Weighed, move: Move) -> float:
-        """Log evidence of a move's set by the columns at the scale's point."""
-        parameters = self.scale.parameters(move.causes)
-        names = {p.name for p in parameters}
-        point = w.hypothesis.point
-        gone = [p for p in w.parameters if p.name not in names]
-        mean = w.prediction.mean - sum(
-            (self.scale.scanned[p.name] * (point[p.name] - p.neutral) for p in gone), np.zeros(self.scale.d)
-        )
-        at = np.array([point.get(p.name, p.neutral) - p.neutral for p in parameters])
-        J = self.scale.scan_columns(parameters)
-        z = self.scale.integrated(move.causes, replace(w.prediction, mean=mean), J, at).log_z
-        return z + self.scale.prior(move.causes)
 
     def answer(self) -> Answer:
         """Probabilities, the test, and what was rejected."""

@@ -163,6 +163,19 @@ class Scale:
         shares = SHARES if self.law_error.left > 0.0 else SHARES[:1]
         return evidence(prediction, columns, x, self.problem.faults, of, self.law_error, shares)
 
+    def promise(self, w: Weighed, causes: Sequence[str]) -> float:
+        """Log evidence of another set of causes, to first order from what was weighed."""
+        parameters = self.parameters(causes)
+        names = {p.name for p in parameters}
+        point = w.hypothesis.point
+        gone = [p for p in w.parameters if p.name not in names]
+        mean = w.prediction.mean - sum(
+            (self.scanned[p.name] * (point[p.name] - p.neutral) for p in gone if p.name in point), np.zeros(self.d)
+        )
+        at = np.array([point.get(p.name, p.neutral) - p.neutral for p in parameters])
+        there = replace(w.prediction, mean=mean)
+        return self.integrated(causes, there, self.scan_columns(parameters), at).log_z + self.prior(causes)
+
     def prior(self, causes: Sequence[str]) -> float:
         """Log prior probability of just these causes."""
         return log_prior(causes, self.problem.causes)
