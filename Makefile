@@ -60,6 +60,7 @@ $(STAMP): requirements.lock pyproject.toml
 wheel: env
 	rm -rf build dist
 	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+	rm -rf build *.egg-info  # found first by a Python that runs in this folder
 
 # HF=--hf: with the HF worker beside the monitor, and the compiler it needs.
 install: wheel

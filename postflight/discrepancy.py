@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ema.core.errors import ConfigError, NoCycleError, RecordError
 from ema.core.folders import make_folder
 from ema.core.records import Record
+
+if TYPE_CHECKING:
+    from ema.core.sidecar import Sidecar
 
 # Which module examines which kind of plant.
 EXAMINERS = {"ema": "ema.discrepancy.actuator", "axis": "ema.discrepancy.axis"}
@@ -52,7 +56,7 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
     if kind not in EXAMINERS:
         raise ConfigError(f"{plant_file}: key 'kind' = {kind!r}: must be one of {', '.join(EXAMINERS)}")
     examiner = import_module(EXAMINERS[kind])
-    read, empty = _read(records)
+    read, empty = _read(records, _plan(plant_file))
     read = _chosen(read, cycles)
     findings_file, report, extended = (out / name for name in ("findings.json", "report.html", "extended.yaml"))
     for path in (findings_file, report, extended):
@@ -84,7 +88,16 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
         click.echo(f"{report}")
 
 
-def _read(paths: Sequence[Path]) -> tuple[list[Record], list[str]]:
+def _plan(plant_file: Path) -> Sidecar | None:
+    """What the plant file says of its records' columns."""
+    from ema.core import config
+    from ema.core.sidecar import Sidecar
+
+    said = config.read_yaml(plant_file).get("record")
+    return None if said is None else config.validate(said, Sidecar, f"{plant_file}, key 'record'")
+
+
+def _read(paths: Sequence[Path], plan: Sidecar | None) -> tuple[list[Record], list[str]]:
     """The records, of directories every log in them, and what is said of logs without a whole cycle beside others."""
     from ema.core.records import each_once, read_record
     from ema.log.reader import find_logs
@@ -93,7 +106,7 @@ def _read(paths: Sequence[Path]) -> tuple[list[Record], list[str]]:
     empty: list[NoCycleError] = []
     for path in each_once(p for given in paths for p in (find_logs(given, (".mcap",)) if given.is_dir() else [given])):
         try:
-            found.append(read_record(path))
+            found.append(read_record(path, plan))
         except NoCycleError as error:
             empty.append(error)
     if not found:

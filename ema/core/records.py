@@ -12,12 +12,16 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import RecordError
 from .names import CHANNELS
+
+if TYPE_CHECKING:
+    from .sidecar import Sidecar
 
 Array = NDArray[np.float64]
 
@@ -103,8 +107,10 @@ class Record:
         return iter(self.cycles)
 
 
-def read_record(path: str | Path) -> Record:
-    """Read a record: CSV by the contract (with its sidecar), or what a registered reader knows by its suffix.
+def read_record(path: str | Path, plan: Sidecar | None = None) -> Record:
+    """Read a record: a table with its sidecar, or what a registered reader knows by its suffix.
+
+    `plan` says what the columns are where no sidecar does (`ema.core.sidecar`).
 
     Raises
     ------
@@ -116,7 +122,7 @@ def read_record(path: str | Path) -> Record:
         raise RecordError(f"{path}: is a directory, not a record")
     if not path.exists():
         raise RecordError(f"{path}: no such file")
-    return _reader(path.suffix.lower())(path)
+    return _reader(path.suffix.lower())(path, plan)
 
 
 def each_once(paths: Iterable[Path]) -> list[Path]:
@@ -129,9 +135,9 @@ def each_once(paths: Iterable[Path]) -> list[Path]:
     return list(found.values())
 
 
-def _reader(suffix: str) -> Callable[[Path], Record]:
+def _reader(suffix: str) -> Callable[[Path, Sidecar | None], Record]:
     for entry in entry_points(group=READERS_GROUP, name=suffix):
-        reader: Callable[[Path], Record] = entry.load()
+        reader: Callable[[Path, Sidecar | None], Record] = entry.load()
         return reader
     from .csv_records import read_csv
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
 
 from . import config
 from .config import Settings
@@ -77,11 +77,20 @@ class Sidecar(Settings):
     """Contents of NAME.record.yaml."""
 
     columns: dict[str, Annotated[Column | None, BeforeValidator(_ignore)]] = Field(default_factory=dict)
-    delimiter: str = Field(default=",", min_length=1, max_length=1)
+    delimiter: str | None = Field(
+        default=None, min_length=1, max_length=1, description="' ' for any white space; else seen from the file"
+    )
+    decimal: Literal[".", ","] | None = Field(default=None, description="decimal sign; else seen from the file")
+    encoding: Literal["utf-8-sig", "utf-8", "latin-1", "cp1252", "utf-16"] = "utf-8-sig"
     skip_rows: int = Field(default=0, ge=0, description="lines above the header")
     comment: str | None = Field(default=None, min_length=1, description="lines beginning with this text are skipped")
     cycles: Cycles | None = None
     note: str = ""
+    _shared: bool = PrivateAttr(default=False)
+
+    def whence(self, path: Path) -> str:
+        """Where this is written, for messages about the record `path`."""
+        return "the plant file, key 'record'" if self._shared else str(beside(path))
 
 
 def beside(path: Path) -> Path:
@@ -89,7 +98,13 @@ def beside(path: Path) -> Path:
     return path.with_name(path.stem + SUFFIX)
 
 
-def read(path: Path) -> Sidecar:
-    """Sidecar of the record `path`; the default one if there is no file."""
+def of(path: Path, plan: Sidecar | None = None) -> Sidecar:
+    """What is known of the record `path`: its sidecar; where it has none, `plan`, as a plant file gives it for all."""
     own = beside(path)
-    return config.load(own, Sidecar) if own.exists() else Sidecar()
+    if own.exists():
+        return config.load(own, Sidecar)
+    if plan is None:
+        return Sidecar()
+    shared = plan.model_copy()
+    shared._shared = True
+    return shared

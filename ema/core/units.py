@@ -96,6 +96,18 @@ def convert(from_unit: str, unit: str) -> tuple[float, float]:
     return one - zero, zero
 
 
+def is_unit(text: str) -> bool:
+    """Whether a text names a unit, such as ``A``, ``rad/s`` or ``°C``."""
+    import pint
+
+    try:
+        _check(text)
+        _registry().Unit(text)
+        return bool(text)
+    except (pint.PintError, *_PARSER):
+        return False
+
+
 def quantity(unit: str, meaning: str, default: Any = ..., **bounds: Any) -> Any:
     """Declare a configuration field: a number in `unit`, with its meaning and its range (ge, gt, le, lt).
 

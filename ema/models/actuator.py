@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, FiniteFloat, model_validator
 
 from ema.core.config import Settings
+from ema.core.sidecar import Sidecar
 from ema.core.units import plain, quantity
 
 
@@ -110,6 +111,11 @@ class Actuator(Settings):
     motion: Motion
     effects: dict[str, dict[str, Annotated[FiniteFloat, BeforeValidator(plain)]]] = Field(
         default_factory=dict, description="terms beyond the nominal model"
+    )
+    record: Sidecar | None = Field(
+        default=None,
+        exclude=True,
+        description="what the columns of records are, where they have no sidecar",
     )
     intervals: dict[str, dict[str, tuple[float, float]]] = Field(
         default_factory=dict, exclude=True, description="of 95 %, of the effects' parameters, where they were measured"

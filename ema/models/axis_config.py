@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 from ema.core import config
 from ema.core.config import Settings
 from ema.core.names import CHANNELS
+from ema.core.sidecar import Sidecar
 from ema.core.units import plain, quantity, to_unit
 from ema.effects import checked
 from ema.effects.torque_term import COLUMNS
@@ -51,6 +52,11 @@ class Axis(Settings):
     )
     effects: dict[str, dict[str, Annotated[float, BeforeValidator(plain)]]] = Field(
         default_factory=dict, description="terms beyond the nominal model"
+    )
+    record: Sidecar | None = Field(
+        default=None,
+        exclude=True,
+        description="what the columns of records are, where they have no sidecar",
     )
     intervals: dict[str, dict[str, tuple[float, float]]] = Field(
         default_factory=dict, exclude=True, description="of 95 %, of the effects' parameters, where they were measured"

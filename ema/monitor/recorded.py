@@ -34,7 +34,7 @@ _SUPPLY = "Supply"
 _HEARD = ("u_dc", "temp_w")
 
 
-def read_mcap(path: Path) -> Record:
+def read_mcap(path: Path, _: object = None) -> Record:
     """The cycles of the one actuator in a log.
 
     Raises
