@@ -20,12 +20,16 @@ from ema_simulator.injection import FaultSource
 from ema_simulator.node import cycles
 from ema_simulator.scenario import Scenario
 from ema_simulator.traffic import Traffic
+from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 
 from ema import bundle
 from ema.bus import codec
 from ema.core import config, resources
 from ema.models.actuator import Actuator
+
+settings.register_profile("ema", deadline=None)  # how long a shared machine takes is nothing that a test asserts
+settings.load_profile("ema")
 
 EPOCH_NS = 1_700_000_000_000_000_000
 
