@@ -14,7 +14,6 @@ from ema.alarms.change import said
 from ema.alarms.supervision import conditions
 from ema.bus import identifiers
 from ema.bus.codec import Codec
-from ema.bus.port import Port
 from ema.bus.protection import Sender
 from ema.core import frames as fr
 from ema.core.status import AlarmLevel, AlarmState
@@ -22,6 +21,7 @@ from ema.log import LogWriter, contents
 from ema.monitor import FIRST, Identified
 
 from .state_file import StateFile
+from .voice import Voice
 
 MESSAGE_ID = "6c1f4d0e9b5e4f2a8d3c7a5be0f19d42"  # of the journal's lines about alarms
 _SAVED_EVERY = 10  # heartbeats, where no alarm changes
@@ -36,7 +36,7 @@ class AlarmDesk:
     settings : AlarmSettings
     actuators : numbers
     codec : Codec
-    port : Port
+    voice : Voice
     log : LogWriter
     state : StateFile
     """
@@ -46,12 +46,12 @@ class AlarmDesk:
         settings: AlarmSettings,
         actuators: Iterable[int],
         codec: Codec,
-        port: Port,
+        voice: Voice,
         log: LogWriter,
         state: StateFile,
     ):
         self.alarms = Alarms(settings, actuators)
-        self._codec, self._port, self._log, self._state = codec, port, log, state
+        self._codec, self._voice, self._log, self._state = codec, voice, log, state
         self._listener = CommandListener(codec, self.alarms.actuators)
         self._sender = Sender()
         self._n_beats = 0
@@ -129,7 +129,7 @@ class AlarmDesk:
         return sum(change.actuator == actuator for change in self.alarms.standing(0))
 
     def _send(self, frames: list[np.ndarray]) -> None:
-        self._port.write(self._sender.protect(fr.joined(frames)))
+        self._voice.write(self._sender.protect(fr.joined(frames)))
 
     def _save(self) -> None:
         self._changed = False

@@ -16,6 +16,7 @@ from ema.bus.interface import open_bus
 from ema.core.config import Settings
 from ema.log import LogSettings, LogWriter
 from ema.monitor import Monitor, Runner
+from ema.monitor.presence import Presence
 
 from .alarming import AlarmDesk
 from .health import Health
@@ -24,6 +25,8 @@ from .service import Service
 from .settings import DaemonSettings, load_alarms, load_bundles
 from .state_file import StateFile
 from .supervision import promised
+from .turn import Turn
+from .voice import Voice
 from .worker import Worker
 
 
@@ -43,6 +46,7 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     local = Runner(bundles, [method for method in settings.monitor.slower if method not in settings.remote]).run
     bundles = {number: bundle.essence for number, bundle in bundles.items()}  # identifiers have what they need
     watch = settings.supervision
+    presence = Presence(codec, monitor.actuators)
     remote = {
         method: RemoteRunner(path, bundles, patience=watch.budget(method)) for method, path in settings.remote.items()
     }
@@ -55,10 +59,11 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     log_settings = LogSettings(**settings.log.model_dump(exclude={"directory"}))
     with ExitStack() as stack:
         log = stack.enter_context(LogWriter(settings.log.directory, attachments, log_settings))
-        port = stack.enter_context(open_bus(settings.bus, _heard(codec), role="Monitor"))
+        port = stack.enter_context(open_bus(settings.bus, [*_heard(codec), *presence.filters()], role="Monitor"))
         state = StateFile(Path(settings.alarms.state or Path(settings.log.directory) / "alarms.json"))
         stack.enter_context(state)
-        desk = AlarmDesk(alarm_settings, bundles, codec, port, log, state)
+        turn = Turn(presence, port.name, watch.listen, settings.standby)
+        desk = AlarmDesk(alarm_settings, bundles, codec, Voice(port, turn), log, state)
         for runner in remote.values():
             stack.callback(runner.close)
         workers = {
@@ -73,7 +78,7 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
         supervisor = promised(bundles, every, remote, watch)
         answering = {method: runner.answers for method, runner in remote.items()}
         health = Health(monitor, port, log, supervisor, answering)
-        yield Service(monitor, port, log, codec, workers, settings.pace, health, watch, desk)
+        yield Service(monitor, port, log, codec, workers, settings.pace, health, watch, desk, turn)
 
 
 def _heard(codec: Codec) -> list[tuple[int, int]]:

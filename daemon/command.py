@@ -25,7 +25,7 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
     sys.modules.update(dict.fromkeys(("asammdf", "dask")))  # type: ignore[arg-type]
 
     from ema.bus import interface
-    from ema.core.errors import EmaError, Failure
+    from ema.core.errors import EmaError, Failure, OccupiedError
     from ema.core.stopping import on_stop
 
     from .journal import use_journal
@@ -48,6 +48,8 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
             on_stop(service.stop)
             started = True
             service.run()
+    except OccupiedError:
+        raise
     except EmaError as error:
         if started:  # so it is not of the configuration
             raise Failure(str(error)) from error

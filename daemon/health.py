@@ -55,6 +55,8 @@ class Health:
     n_failed: int = 0  # jobs that ended in an error
     n_timeout: int = 0  # times that something expected of an actuator did not come
     latency: float = 0.0  # longest from a cycle's last frame to its linear estimate on the bus, since the last beat [s]
+    contested: frozenset[int] = frozenset()  # actuators that another monitor watches as well
+    standing_by: bool = False
     state: ServiceState = ServiceState.STARTING
     counters: dict[str, int] = field(default_factory=dict)
     _heard: dict[tuple[int, str], int] = field(default_factory=dict)
@@ -72,6 +74,7 @@ class Health:
                 Promise(Lapse.ERROR_PASSIVE): bus is not BusState.ERROR_PASSIVE,
                 Promise(Lapse.FLOODED): not self.port.flooded,
                 Promise(Lapse.LOG): self.log.state is LogState.OK,
+                **{Promise(Lapse.SECOND_MONITOR, n): n not in self.contested for n in self.monitor.actuators},
                 **{worker_of(method): answers() for method, answers in self.answering.items()},
             }
         )
@@ -155,6 +158,8 @@ class Health:
         self._heard = heard
 
     def _judge(self) -> ServiceState:
+        if self.standing_by:
+            return ServiceState.STANDBY
         if self.supervisor.lapsed:
             return ServiceState.DEGRADED
         return ServiceState.STARTING if self.supervisor.awaited else ServiceState.RUNNING

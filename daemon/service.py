@@ -11,6 +11,7 @@ import numpy as np
 from ema.alarms import Command, in_order
 from ema.bus.codec import Codec
 from ema.bus.port import MAX_BATCH, Port
+from ema.core.errors import OccupiedError
 from ema.core.frames import joined, overflow_notice
 from ema.core.status import ServiceState
 from ema.log import LogWriter
@@ -35,6 +36,8 @@ from .memory import settle
 from .notify import notify
 from .sinks import BusSink, LogSink
 from .supervision import LOOK, SupervisionSettings
+from .turn import Turn
+from .voice import Voice
 from .worker import Worker
 
 BEAT = 1.0  # [s]
@@ -63,6 +66,7 @@ class Service:
     health : Health
     watch : SupervisionSettings
     desk : AlarmDesk
+    turn : Turn
     """
 
     def __init__(
@@ -76,11 +80,12 @@ class Service:
         health: Health,
         watch: SupervisionSettings,
         desk: AlarmDesk,
+        turn: Turn,
     ):
         self._monitor, self._port, self._log = monitor, port, log
-        self._bus_sink, self._log_sink = BusSink(port, codec), LogSink(log)
+        self._bus_sink, self._log_sink = BusSink(Voice(port, turn), codec), LogSink(log)
         self._workers, self._pace = workers, pace
-        self._health, self._desk = health, desk
+        self._health, self._desk, self._turn = health, desk, turn
         self._arrival, self._timeliness = Arrival(), Timeliness(watch.budget)
         self._near = _PACES * pace
         self._later: list[Output | Verdict | Command] = []  # answers of which the rest of the work is left to do
@@ -101,7 +106,7 @@ class Service:
         self._desk.start(time.time_ns())
         settle()
         sys.setswitchinterval(_SWITCH)
-        notify("READY=1")
+        self._take_turn(started, 0.0)
         while not self._stopping:
             frames = self._port.read(min(_WAIT, max(0.0, next_look - time.monotonic())))
             urgent = False
@@ -113,23 +118,46 @@ class Service:
                 self._answer_jobs(self._workers.values())
             now = time.monotonic()
             if now >= next_look + (_LOOK_WAITS if urgent else 0.0):
+                self._take_turn(now, now - started)
                 changed = self._look(now)
                 next_look = max(next_look + LOOK, now)
-                if now >= next_beat or changed:
+                if self._turn.listening:
+                    next_beat = now
+                elif now >= next_beat or changed:
                     self._beat(now - started)
-                if now >= next_beat:
-                    next_beat = max(next_beat + BEAT, now)
+                    next_beat = max(next_beat + BEAT, now) if now >= next_beat else next_beat
             if 0 < frames.size < MAX_BATCH // 2 and not urgent:
                 time.sleep(self._pace)
         notify("STOPPING=1")
         self._finish(time.monotonic() - started)
 
+    def _take_turn(self, now: float, uptime: float) -> None:
+        """See whether another monitor is on the bus, and whether this one may speak."""
+        turn, health = self._turn, self._health
+        listening = turn.listening
+        try:
+            told = turn.look(now, uptime)
+        except OccupiedError as error:
+            self._event(Level.ERROR, "occupied", str(error))
+            raise
+        if told:
+            self._event(Level.WARNING, *told)
+        if listening and not turn.listening:
+            notify("READY=1")
+        health.standing_by = not turn.speaking and not turn.listening
+        other = turn.presence.other(now) if turn.speaking else None
+        health.contested = frozenset() if other is None else other.actuators
+
     def _ingest(self, frames: np.ndarray) -> None:
         if self._port.counters.kernel_drops != self._drops:
             self._drops = self._port.counters.kernel_drops
             frames = joined([overflow_notice(int(frames["t_ns"][0])), frames])
-        self._arrival.note(frames, time.time_ns(), time.monotonic())
+        now = time.monotonic()
+        self._arrival.note(frames, time.time_ns(), now)
         self._log.frames(frames, self._port.name)
+        frames = self._turn.presence.without(frames, now)
+        if not frames.size:
+            return
         self._settle(int(frames["t_ns"][-1]))
         self._put(in_order(self._desk.hear(frames), self._monitor.stream(frames)))
 

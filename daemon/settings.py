@@ -61,6 +61,10 @@ class DaemonSettings(Settings):
         default_factory=dict, description="identifiers in a process of their own (`ema hf-worker`): its Unix socket"
     )
     supervision: SupervisionSettings = SupervisionSettings()
+    standby: bool = Field(
+        default=False,
+        description="beside another monitor of an actuator: listen, and take over when it is silent",
+    )
     pace: float = quantity("s", "frames are collected for so long before they are looked at", 3e-3, ge=0, le=0.1)
     queue: int = Field(default=8, ge=1, le=1000, description="cycles that may wait for a slower identifier")
 

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from ema.bus.codec import Codec
-from ema.bus.port import Port
 from ema.bus.protection import Sender
 from ema.core.status import ServiceState
 from ema.identification import NuisanceEstimate
 from ema.log import LogWriter, contents
 from ema.monitor import Event, Identified, Level, SampledEnvelope
 from ema.monitor.supervision import Promise
+
+from .voice import Voice
 
 logger = logging.getLogger("ema.daemon")
 _LEVELS = {Level.INFO: logging.INFO, Level.WARNING: logging.WARNING, Level.ERROR: logging.ERROR}
@@ -30,8 +31,8 @@ def estimate_message(method: str) -> str:
 class BusSink:
     """Sends estimates and heartbeats."""
 
-    def __init__(self, port: Port, codec: Codec):
-        self._port, self._codec = port, codec
+    def __init__(self, voice: Voice, codec: Codec):
+        self._voice, self._codec = voice, codec
         self._sender = Sender()
 
     def estimate(self, out: Identified, age: float) -> None:
@@ -74,7 +75,7 @@ class BusSink:
         self._send("Supervision", 0, {name: np.uint64(bits) for name, bits in supervision.items()}, t_ns)
 
     def _send(self, name: str, actuator: int, values: dict[str, Any], t_ns: int) -> None:
-        self._port.write(self._sender.protect(self._codec.encode(name, actuator, values, t_ns)))
+        self._voice.write(self._sender.protect(self._codec.encode(name, actuator, values, t_ns)))
 
 
 class LogSink:

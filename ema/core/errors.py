@@ -33,6 +33,10 @@ class BusError(EmaError):
     """A bus cannot be opened, or a frame cannot be encoded."""
 
 
+class OccupiedError(BusError):
+    """Another program does on this bus what this one would."""
+
+
 class LogError(EmaError):
     """A log cannot be written or read."""
 

@@ -194,6 +194,20 @@ def test_a_flood_is_told(world):
     assert world.state is ServiceState.DEGRADED
 
 
+def test_a_second_monitor_is_told_with_the_actuator(world):
+    world.health.contested = frozenset({3})
+    assert world.go(1.0) == [(0.25, "second_monitor")]
+    assert world.beat() == (Lapse.SECOND_MONITOR, 3)
+    world.health.contested = frozenset()
+    assert world.go(1.0) == [(0.25, "second_monitor_over")]
+
+
+def test_one_that_stands_by_does_not_say_it_runs(world):
+    world.health.standing_by = True
+    world.go(1.0)
+    assert world.state is ServiceState.STANDBY
+
+
 def test_missing_frames_degrade_until_they_stop_missing(world):
     world.health.beat(1)
     world.monitor.counts = Counts(n_lost=4, n_crc_error=1)

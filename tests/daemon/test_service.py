@@ -13,6 +13,7 @@ from desks import desk
 from ema_daemon.health import Health
 from ema_daemon.service import Service
 from ema_daemon.supervision import SupervisionSettings, promised
+from ema_daemon.turn import Turn
 from ema_daemon.worker import Worker
 from ema_postflight.compare import Comparison
 from ema_postflight.identify import Setup, identified
@@ -24,6 +25,7 @@ from ema.core.status import Reason, ServiceState
 from ema.log import LogReader, LogWriter, Message
 from ema.log.schemas import ESTIMATE
 from ema.monitor import Identified, Monitor, MonitorSettings, Runner, answers
+from ema.monitor.presence import Presence
 
 CODEC = codecs.default()
 WATCH = SupervisionSettings(age={"linear": 60.0, "lf2": 60.0})  # this machine may be busy with other tests
@@ -50,9 +52,10 @@ def run(coarse_bundle, tmp_path, scripted):
         monitor = Monitor(bundles, CODEC, SETTINGS)
         worker = Worker(run_job or Runner(bundles).run, queue, "lf2")
         port = scripted(batches, lambda: service.stop())
+        turn = Turn(Presence(CODEC, monitor.actuators), port.name, 0.0, False)
         with LogWriter(tmp_path) as log, desk(bundles, port, log, tmp_path) as alarms:
             health = Health(monitor, port, log, promised([0], {"lf2": 2.0}, [], WATCH))
-            service = Service(monitor, port, log, CODEC, {"lf2": worker}, 0.0, health, watch, alarms)
+            service = Service(monitor, port, log, CODEC, {"lf2": worker}, 0.0, health, watch, alarms, turn)
             service.run()
         with LogReader(tmp_path) as reader:
             return Ran(port, reader)
