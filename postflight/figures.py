@@ -18,7 +18,7 @@ from .report_settings import ReportSettings, Severity
 from .series import Points
 
 _BLUE, _GREY = "#1f4e79", "#9aa5b1"
-COLOURS = {Severity.OK: "#2e7d4f", Severity.WATCH: "#b8860b", Severity.WARNING: "#c75b12", Severity.ALARM: "#a61b1b"}
+COLOURS = {Severity.OK: "#2e7d4f", Severity.WATCH: "#b8860b", Severity.ALARM: "#a61b1b"}
 _N_POINTS = 300  # drawn of a series
 _STYLE: Any = {
     "font.size": 8,
@@ -46,7 +46,7 @@ def trend(actuator: ActuatorHistory, health: Health, settings: ReportSettings) -
             if health.method:
                 top = _band(ax, drawn[health.method], index, scale, health.method)
             top = max(1.25 * top, 0.02)
-            for severity, level in zip(list(Severity)[1:], settings.severity[fault].levels, strict=True):
+            for severity, level in zip(list(Severity)[1:], settings.alarms.faults[fault].setpoints, strict=True):
                 if level < top:
                     ax.axhline(level, color=COLOURS[severity], lw=0.9, ls=(0, (4, 3)))
                     ax.annotate(
@@ -97,7 +97,7 @@ def envelope(content: dict[str, Any]) -> str:
             2, 1, figsize=(5.0, 3.6), sharex=True, height_ratios=[2.2, 1], layout="constrained"
         )
         upper.errorbar(t, measured, 2 * sd, fmt="o", ms=3, color=_BLUE, lw=0.8, label="measured ± 2 sd")
-        upper.plot(t, model, "x", color=COLOURS[Severity.WARNING], ms=5, label="model at the estimate")
+        upper.plot(t, model, "x", color="#c75b12", ms=5, label="model at the estimate")
         upper.set_ylabel("envelope [A]")
         upper.legend(fontsize=7, frameon=False)
         lower.axhspan(-2, 2, color="#eef2f6")

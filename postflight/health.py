@@ -8,6 +8,7 @@ import numpy as np
 
 from ema.core.names import FAULT_MEANING, FAULTS
 from ema.core.status import Reason
+from ema.monitor import FIRST
 
 from .history import ActuatorHistory
 from .prognosis import Prognosis, Trend, prognosis
@@ -23,7 +24,7 @@ class FaultHealth:
     meaning: str
     k: float
     sd: float
-    severity: Severity
+    severity: Severity | None
     life_threshold: float
     life: Prognosis
 
@@ -42,7 +43,7 @@ class Health:
     @property
     def severity(self) -> Severity | None:
         """The worst of its faults, None when nothing is known."""
-        return max((fault.severity for fault in self.faults), default=None)
+        return max((fault.severity for fault in self.faults if fault.severity is not None), default=None)
 
     @property
     def doubted(self) -> bool:
@@ -57,11 +58,13 @@ def health(actuator: ActuatorHistory, settings: ReportSettings, last_ns: int) ->
         if series is None or series.last is None:
             continue
         if (last_ns - series.last.t_ns) / 1e9 <= settings.recent:
-            return _health(actuator.number, method, series, series.last, settings)
+            judged = actuator.series.get(FIRST, series)
+            return _health(actuator.number, method, series, judged, series.last, settings)
     return Health(actuator.number, "", None, [], [], 0)
 
 
-def _health(number: int, method: str, series: Series, last: Last, settings: ReportSettings) -> Health:
+def _health(number: int, method: str, series: Series, judged: Series, last: Last, settings: ReportSettings) -> Health:
+    """Numbers by `series`; severity by `judged`, the method of every cycle, as the daemon's alarms."""
     points = series.points
     faults = []
     for index, fault in enumerate(FAULTS):
@@ -71,6 +74,6 @@ def _health(number: int, method: str, series: Series, last: Last, settings: Repo
         trend = Trend(points.t_op, points.k[:, index], sd)
         life = prognosis(trend, threshold, np.random.default_rng([number, index]))
         now = float(last.k[index]), float(last.sd[index])
-        severity = series.tracks[fault].severity
+        severity = judged.tracks[fault].severity
         faults.append(FaultHealth(fault, FAULT_MEANING[fault], *now, severity, threshold, life))
-    return Health(number, method, last, faults, list(series.changes), series.n_changes)
+    return Health(number, method, last, faults, list(judged.changes), judged.n_changes)

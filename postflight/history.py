@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ema.core.errors import LogError
-from ema.core.names import FAULTS
 from ema.log import LogReader
 
 from .open_log import names
@@ -77,6 +76,9 @@ class History:
     actuators: dict[int, ActuatorHistory] = field(default_factory=dict)
     events: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=_LAST))
     event_counts: Counter[str] = field(default_factory=Counter)
+    alarms: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=_LAST))  # changes
+    n_alarms: int = 0  # changes
+    standing: dict[tuple[int | None, str], dict[str, Any]] = field(default_factory=dict)  # at the end, as last told
     starts: int = 0  # of the daemon, by its uptime
     status: dict[str, Any] | None = None  # the last one
     counters: Counter[str] = field(default_factory=Counter)  # over all starts
@@ -108,6 +110,8 @@ def read(log: LogReader, settings: ReportSettings) -> History:
             elif topic == "/event":
                 history.events.append(content)
                 history.event_counts[content["level"]] += 1
+            elif topic == "/alarm":
+                _note_alarm(history, content)
             elif topic == "/status":
                 _note_status(history, content)
         except (KeyError, TypeError, ValueError) as error:
@@ -128,8 +132,7 @@ def _actuator(history: History, content: dict[str, Any], settings: ReportSetting
 def _note_estimate(actuator: ActuatorHistory, content: dict[str, Any], settings: ReportSettings) -> None:
     method = content["method"]
     if method not in actuator.series:
-        levels = {fault: settings.severity[fault].levels for fault in FAULTS}
-        actuator.series[method] = Series(levels, settings.persistence)
+        actuator.series[method] = Series(settings.alarms)
     actuator.series[method].add(content, actuator.operating.at(content["t_ns"]))
     if content["status"] != "valid":
         actuator.flagged.append(content)
@@ -152,6 +155,15 @@ def _note_envelope(actuator: ActuatorHistory, content: dict[str, Any]) -> None:
     worst = actuator.worst
     if worst is not None and worst.get("awaited") and worst["cycle"] == content["cycle"]:
         actuator.worst = content
+
+
+def _note_alarm(history: History, content: dict[str, Any]) -> None:
+    history.alarms.append(content)
+    history.n_alarms += 1
+    key = content["actuator"], content["cause"]
+    history.standing.pop(key, None)
+    if content["state"] != "inactive":
+        history.standing[key] = content
 
 
 def _note_status(history: History, content: dict[str, Any]) -> None:

@@ -7,14 +7,12 @@ from collections.abc import Iterator, Set
 from dataclasses import dataclass
 
 import click
-import yaml
 
 from ema.alarms import AlarmSettings, Command
 from ema.bundle import Bundle
 from ema.bundle import load as load_bundle
 from ema.bus import codec as codecs
 from ema.bus import identifiers
-from ema.core import config
 from ema.core.errors import BundleError, LogError
 from ema.log import LogReader, Message, contents, schemas
 from ema.log.schemas import Encoded
@@ -37,6 +35,7 @@ from ema.monitor.recorded import configuration, monitor_settings
 from .alarms_again import AlarmsAgain
 from .open_log import names
 from .received import Log, received, received_beside, worth_a_process
+from .report_settings import of_log
 
 _Key = tuple[int, int | None, str]  # t_ns, actuator, method
 _LOOK_AT = 20_000  # frames of a log without configuration, to see whose they are
@@ -94,7 +93,7 @@ def setup(log: Log, given: tuple[str, ...]) -> Setup:
                 f"to compare the two, name it with --bundle"
             )
     is_same = len(same) == len(numbers) and all(same.values())
-    return Setup(bundles, monitor_settings(configured), is_same, _alarm_settings(attached))
+    return Setup(bundles, monitor_settings(configured), is_same, of_log(attached))
 
 
 def identified(
@@ -138,16 +137,6 @@ def identified(
             for out in answered(outputs, monitor, runner):
                 yield _encoded(_as_sent(out, told))
                 yield from alarms.answer(out)
-
-
-def _alarm_settings(attached: dict[str, bytes]) -> AlarmSettings | None:
-    text = attached.get("alarms.yaml")
-    if text is None:
-        return None
-    try:
-        return config.validate(yaml.safe_load(text), AlarmSettings, "alarms.yaml in the log")
-    except (yaml.YAMLError, ValueError) as error:
-        raise LogError("alarms.yaml in the log is damaged") from error
 
 
 def _job(job: Job) -> _Key:

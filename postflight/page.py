@@ -65,6 +65,7 @@ def page(log: LogReader, settings: ReportSettings) -> str:
             history=history,
             counted=_COUNTED,
             settings=settings,
+            severities={"none": None} | {s.name.lower(): s for s in Severity},
             faults=FAULTS,
             meanings=FAULT_MEANING,
             begin=iso(history.first_ns),

@@ -1,55 +1,60 @@
-"""What the report calls severe (config/report.yaml)."""
+"""What the report shows (config/report.yaml), and what it calls severe (config/alarms.yaml)."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import IntEnum
 from typing import Literal
 
-from pydantic import Field, field_validator, model_validator
+import yaml
+from pydantic import Field, field_validator
 
+from ema.alarms import AlarmSettings
+from ema.core import config, resources
 from ema.core.config import Settings
-from ema.core.names import FAULTS
+from ema.core.errors import LogError
 from ema.core.units import quantity
 from ema.log.schemas import METHODS
 
 
 class Severity(IntEnum):
-    """How bad a fault is."""
+    """How bad a fault is: the level of its condition, as the daemon's alarms judge it."""
 
     OK = 0
     WATCH = 1
-    WARNING = 2
-    ALARM = 3
+    ALARM = 2
 
 
-class Thresholds(Settings):
-    """Of one fault."""
+def shipped() -> AlarmSettings:
+    """The thresholds that come with this software."""
+    return config.load(resources.config("alarms.yaml"), AlarmSettings)
 
-    watch: float = quantity("", "look at it at the next occasion", gt=0, le=1)
-    warning: float = quantity("", "plan the repair", gt=0, le=1)
-    alarm: float = quantity("", "repair before the next flight", gt=0, le=1)
 
-    @model_validator(mode="after")
-    def _ascending(self) -> Thresholds:
-        if not self.watch < self.warning < self.alarm:
-            raise ValueError(f"watch, warning, alarm must ascend, are {self.watch}, {self.warning}, {self.alarm}")
-        return self
+def of_log(attached: Mapping[str, bytes]) -> AlarmSettings | None:
+    """The daemon's own thresholds among the files in its log; None where it was made without alarms.
 
-    @property
-    def levels(self) -> tuple[float, float, float]:
-        """In the order of Severity, from WATCH."""
-        return self.watch, self.warning, self.alarm
+    Raises
+    ------
+    LogError
+        They are damaged.
+    """
+    text = attached.get("alarms.yaml")
+    if text is None:
+        return None
+    try:
+        return config.validate(yaml.safe_load(text), AlarmSettings, "alarms.yaml in the log")
+    except (yaml.YAMLError, ValueError) as error:
+        raise LogError("alarms.yaml in the log is damaged") from error
 
 
 class ReportSettings(Settings):
-    """The whole configuration of the report."""
+    """The whole configuration of the report; `alarms` is a file of its own."""
 
     methods: list[str] = Field(default=["hf", "lf2", "linear"], min_length=1)
     recent: float = quantity("s", "age of the oldest estimate taken for the health", 60.0, gt=0)
     longest_gap: float = quantity("s", "a longer silence is a break, not time of operation", 60.0, gt=0)
-    persistence: int = Field(default=3, ge=1, le=1000, description="estimates in a row that change the severity")
-    severity: dict[str, Thresholds] = Field(description="by fault")
-    life_until: Literal["watch", "warning", "alarm"] = "alarm"
+    life_until: Literal["watch", "alarm"] = "alarm"
+    alarms: AlarmSettings = Field(default_factory=shipped)
 
     @field_validator("methods")
     @classmethod
@@ -59,13 +64,6 @@ class ReportSettings(Settings):
             raise ValueError(f"identifier '{odd[0]}' is not in logs; {', '.join(METHODS)} are")
         return methods
 
-    @model_validator(mode="after")
-    def _every_fault(self) -> ReportSettings:
-        odd = sorted(set(self.severity) ^ set(FAULTS))
-        if odd:
-            raise ValueError(f"severity must name {', '.join(FAULTS)}: {odd[0]} is missing or unknown")
-        return self
-
     def life_threshold(self, fault: str) -> float:
         """k at which a fault's life ends."""
-        return float(getattr(self.severity[fault], self.life_until))
+        return float(getattr(self.alarms.faults[fault], self.life_until))

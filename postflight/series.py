@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ema.alarms import AlarmSettings
+from ema.alarms.condition import Condition
 from ema.core.names import FAULTS
-from ema.core.status import Status
+from ema.core.status import AlarmLevel, Status
 
 from .report_settings import Severity
 
@@ -63,31 +64,33 @@ class Change(NamedTuple):
 
 
 class SeverityTrack:
-    """Severity of one fault over time.
+    """Severity of one fault over time, judged as by the daemon: by the lower end, with persistence and hysteresis.
 
-    It rises to the lowest, and falls to the highest, severity of `persistence` estimates in a row; before there are so
-    many it is their lowest.
+    Before as many estimates are seen as it takes to find something, nothing is known: None.
     """
 
-    def __init__(self, levels: tuple[float, ...], persistence: int):
-        self._levels = levels
-        self._recent: deque[int] = deque(maxlen=persistence)
+    def __init__(self, fault: str, alarms: AlarmSettings):
+        self._alarms = alarms
+        self._condition = Condition(alarms.faults[fault].setpoints, alarms.persistence, alarms.hysteresis)
         self._n = 0
-        self.severity = Severity.OK
 
-    def add(self, k: float) -> Severity | None:
-        """Take an estimate; the severity before, if it has changed."""
-        self._recent.append(sum(k >= level for level in self._levels))
-        self._n += 1
-        low, high = Severity(min(self._recent)), Severity(max(self._recent))
-        before = self.severity
-        if self._n <= (self._recent.maxlen or 1):
-            self.severity = low
+    @property
+    def severity(self) -> Severity | None:
+        """Now."""
+        if self._condition.level == AlarmLevel.NONE and self._n < self._alarms.persistence.m:
             return None
-        if low > before or high < before:
-            self.severity = low if low > before else high
-            return before
-        return None
+        return Severity(int(self._condition.level))
+
+    def add(self, k: float, sd: float) -> Severity | None:
+        """Take an estimate; the severity before, if it has changed."""
+        before = self._condition.level
+        self._n += 1
+        level = self._condition.update(k - self._alarms.deviations * sd)
+        return Severity(int(before)) if level != before else None
+
+    def forget(self) -> None:
+        """A break lies before the next estimate."""
+        self._condition.forget()
 
 
 class Points(NamedTuple):
@@ -118,9 +121,7 @@ class Series:
 
     Parameters
     ----------
-    levels : mapping of fault to ascending thresholds
-    persistence : int
-        See SeverityTrack.
+    alarms : AlarmSettings
 
     Attributes
     ----------
@@ -130,9 +131,10 @@ class Series:
         The latest; `n_changes` counts all.
     """
 
-    def __init__(self, levels: Mapping[str, tuple[float, ...]], persistence: int):
+    def __init__(self, alarms: AlarmSettings):
         self.last: Last | None = None
-        self.tracks = {fault: SeverityTrack(levels[fault], persistence) for fault in FAULTS}
+        self._alarms = alarms
+        self.tracks = {fault: SeverityTrack(fault, alarms) for fault in FAULTS}
         self.changes: deque[Change] = deque(maxlen=_CHANGES)
         self.n_changes = 0
         self._table = np.empty((MOST, 1 + 3 * _N))
@@ -146,18 +148,27 @@ class Series:
         status = Status[content["status"].upper()]
         if status > Status.DEGRADED or not np.isfinite(k).all():
             return
-        self.last = Last(content["t_ns"], content["cycle"], status, tuple(content["reasons"]), k, sd)
-        for fault, value in zip(FAULTS, k.tolist(), strict=True):
-            before = self.tracks[fault].add(value)
-            if before is not None:
-                self.changes.append(Change(self.last.t_ns, t_op, fault, self.tracks[fault].severity, before, value))
-                self.n_changes += 1
+        t_ns, before = content["t_ns"], self.last
+        self.last = Last(t_ns, content["cycle"], status, tuple(content["reasons"]), k, sd)
+        if before is not None and t_ns - before.t_ns > self._alarms.longest_gap * 1e9:
+            for track in self.tracks.values():
+                track.forget()
+        if np.isfinite(sd).all() and not set(content["reasons"]) & set(self._alarms.not_counted):
+            self._judge(self.last, t_op)
         if self._n == MOST:
             self._merge()
         known = np.isfinite(sd) & (sd > 0)
         weight = np.where(known, 1.0 / np.where(known, sd, 1.0) ** 2, 0.0)
         self._table[self._n] = [t_op, *k, *sd, *weight]
         self._n += 1
+
+    def _judge(self, last: Last, t_op: float) -> None:
+        for fault, k, sd in zip(FAULTS, last.k.tolist(), last.sd.tolist(), strict=True):
+            track = self.tracks[fault]
+            before = track.add(k, sd)
+            if before is not None and track.severity is not None:
+                self.changes.append(Change(last.t_ns, t_op, fault, track.severity, before, k))
+                self.n_changes += 1
 
     @property
     def points(self) -> Points:

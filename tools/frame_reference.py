@@ -67,7 +67,7 @@ def _message(message: Any) -> Iterator[str]:
     for signal in message.signals:
         first = signal.start // 8
         order = "little-endian " if signal.byte_order == "little_endian" and signal.length > 8 else ""
-        kind = f"{order}{'int' if signal.is_signed else 'uint'}{signal.length}"
+        kind = f"{order}{'float' if signal.is_float else 'int' if signal.is_signed else 'uint'}{signal.length}"
         meaning = signal.comment.removesuffix(f" [{signal.unit}]") if signal.unit else signal.comment
         if signal.choices:
             meaning += " " + ", ".join(f"{value} {name}" for value, name in signal.choices.items()) + "."

@@ -70,3 +70,18 @@ def flight(tmp_path_factory):
     log.close()
     assert len(list(directory.glob("*.mcap"))) > 2
     return directory
+
+
+@pytest.fixture(scope="session")
+def faulty_flight(tmp_path_factory):
+    """Twelve cycles of a growing k1: linear in each, LF2 in three of them; alarms as the daemon logs them."""
+    directory = tmp_path_factory.mktemp("faulty")
+    log = SegmentedLog(directory, {}, LogSettings(keep_free=0), T0, 0.0)
+    for cycle in range(12):
+        k = np.array([0.02 + 0.08 * cycle / 12, 0, 0, 0, 0, 0])
+        for method in ("linear", "lf2") if cycle % 5 == 0 else ("linear",):
+            t_ns, nothing = T0 + cycle * 10**9, Reason(0)
+            made = Estimate(method, k, np.full(6, 0.003), np.eye(6), 20.0, 24, 0.4, np.zeros(30), Status.VALID, nothing)
+            log.write(schemas.ESTIMATE.encode(contents.estimate(t_ns, 0, cycle, made)))
+    log.close()
+    return directory

@@ -10,13 +10,15 @@ import yaml
 from axe_look import BROWSER, look
 from click.testing import CliRunner
 from ema_postflight.report import report
-from ema_postflight.report_settings import ReportSettings, Severity
+from ema_postflight.report_settings import Severity, shipped
 from ema_postflight.series import MOST, OperatingTime, Series, SeverityTrack
 
-from ema.core import config, resources
+from ema.core import resources
 from ema.core.errors import ConfigError, LogError
+from ema.core.names import FAULTS
 from ema.log import LogReader
 
+ALARMS = shipped()
 LOOK = """<script>addEventListener("load", () => {
   const pictures = [...document.images].map(i => ({w: i.naturalWidth, shown: i.getBoundingClientRect().width}));
   const k = [...document.querySelectorAll("[data-fault]")].map(e => ({...e.dataset, text: e.innerText}));
@@ -129,25 +131,45 @@ def test_what_a_log_says_is_never_taken_for_markup(flight, tmp_path):
 
 
 def test_severity_needs_persistence():
-    settings = config.load(resources.config("report.yaml"), ReportSettings)
-    ok, watch, warning = 0.01, 0.10, 0.20
+    ok, watch, alarm = 0.01, 0.10, 0.20
 
-    def run(*k):
-        track = SeverityTrack(settings.severity["k1"].levels, settings.persistence)
-        changes = [(at, track.severity) for at, value in enumerate(k) if track.add(value) is not None]
+    def run(*k, sd=0.001):
+        track = SeverityTrack("k1", ALARMS)
+        changes = [(at, track.severity) for at, value in enumerate(k) if track.add(value, sd) is not None]
         return changes, track.severity
 
-    assert run(ok, ok, ok, warning, ok, warning, ok) == ([], Severity.OK)
-    assert run(ok, ok, ok, watch, warning, watch, watch) == ([(5, Severity.WATCH)], Severity.WATCH)
-    assert run(warning, warning, warning, ok, watch, ok) == ([(5, Severity.WATCH)], Severity.WATCH)
-    assert run(ok) == ([], Severity.OK)
+    assert run(ok, ok, ok, alarm, ok, ok, alarm) == ([], Severity.OK)
+    assert run(ok, ok, ok, watch, alarm, watch, watch) == ([(5, Severity.WATCH)], Severity.WATCH)
+    assert run(alarm, alarm, alarm, ok, watch, ok, ok)[1] == Severity.OK
+    assert run(ok, ok) == ([], None)  # too few to know
+
+
+def test_severity_is_that_of_the_lower_end():
+    def severity(sd):
+        track = SeverityTrack("k1", ALARMS)
+        for _ in range(5):
+            track.add(0.07, sd)
+        return track.severity
+
+    assert severity(0.002) == Severity.WATCH
+    assert severity(0.02) == Severity.OK
+
+
+def test_a_fault_of_a_short_flight_is_not_ok(faulty_flight, tmp_path):
+    """The tutorial's: twelve cycles in which k1 grows to 0.1, of which LF2 saw three."""
+    arguments = [str(faulty_flight), "--out", str(tmp_path / "r.html")]
+    CliRunner().invoke(report, arguments, catch_exceptions=False)
+    text = (tmp_path / "r.html").read_text()
+    health = text[text.index('id="health"') : text.index("</table>")]
+    assert '<span class="badge watch">' in health
+    assert "lf2" in health
 
 
 def test_thresholds_come_from_the_configuration(flight, tmp_path):
-    thresholds = yaml.safe_load(resources.config("report.yaml").read_text())
-    thresholds["severity"]["k1"] = {"watch": 0.9, "warning": 0.95, "alarm": 0.99}
-    (tmp_path / "r.yaml").write_text(yaml.safe_dump(thresholds))
-    arguments = [str(flight), "--out", str(tmp_path / "r.html"), "--config", str(tmp_path / "r.yaml")]
+    thresholds = yaml.safe_load(resources.config("alarms.yaml").read_text())
+    thresholds["faults"]["k1"] = {"watch": 0.9, "alarm": 0.99}
+    (tmp_path / "a.yaml").write_text(yaml.safe_dump(thresholds))
+    arguments = [str(flight), "--out", str(tmp_path / "r.html"), "--alarms", str(tmp_path / "a.yaml")]
     CliRunner().invoke(report, arguments, catch_exceptions=False)
     assert "Changes of severity" not in (tmp_path / "r.html").read_text()
 
@@ -155,8 +177,8 @@ def test_thresholds_come_from_the_configuration(flight, tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"severity": {}}, "severity must name k1"),
-        ({"persistence": 0}, "persistence"),
+        ({"severity": {}}, "'severity' is unknown"),
+        ({"alarms": {"faults": {}}}, "faults"),
         ({"colour": "red"}, "'colour' is unknown"),
         ({"methods": ["hf", "lf1"]}, r"r\.yaml: key 'methods' .*identifier 'lf1' is not in logs; linear, lf2, hf are"),
     ],
@@ -179,7 +201,7 @@ def test_nothing_is_overwritten_and_an_empty_log_is_told(flight, page, tmp_path)
 
 def _series(n, sd=0.01):
     rng = np.random.default_rng(4)
-    series = Series({f"k{i}": (0.05, 0.15, 0.3) for i in range(1, 7)}, 3)
+    series = Series(ALARMS)
     k = 0.1 * np.linspace(0, 1, n)[:, None] + sd * rng.standard_normal((n, 6))
     for at, row in enumerate(k):
         content = {"t_ns": at, "cycle": at, "status": "valid", "reasons": [], "k": row.tolist(), "sd": [sd] * 6}
@@ -198,12 +220,15 @@ def test_a_long_series_is_kept_in_bounded_memory_without_losing_its_mean_last_va
     assert mean == pytest.approx(k.mean(axis=0), rel=1e-9)
     assert points.sd == pytest.approx(sd)
     assert series.last.k.tolist() == k[-1].tolist()
-    assert (series.last.cycle, series.n_changes) == (n - 1, sum(_n_changes(column) for column in k.T))
+    assert (series.last.cycle, series.n_changes) == (
+        n - 1,
+        sum(_n_changes(f, column, sd) for f, column in zip(FAULTS, k.T, strict=True)),
+    )
 
 
-def _n_changes(k):
-    track = SeverityTrack((0.05, 0.15, 0.3), 3)
-    return sum(track.add(value) is not None for value in k)
+def _n_changes(fault, k, sd):
+    track = SeverityTrack(fault, ALARMS)
+    return sum(track.add(value, sd) is not None for value in k)
 
 
 def test_breaks_between_flights_are_not_time_of_operation():

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
-from ema_postflight.report_settings import ReportSettings, Severity
 from ema_postflight.series import SeverityTrack
 from ema_simulator.fleet import CycleData
 from ema_simulator.traffic import Traffic
 
+from ema.alarms import AlarmSettings
 from ema.bundle import Bundle
 from ema.bus import codec as codecs
 from ema.bus.codec import Codec
@@ -53,14 +53,13 @@ class Watched(NamedTuple):
 
     def alarms(self, k: Sequence[float]) -> list[str]:
         """Faults that are worth watching at the end of the flight by the report's thresholds, and are not there."""
-        settings = config.load(resources.config("report.yaml"), ReportSettings)
+        settings = config.load(resources.config("alarms.yaml"), AlarmSettings)
         found = []
         for j, fault in enumerate(FAULTS):
-            levels = settings.severity[fault].levels
-            track = SeverityTrack(levels, settings.persistence)
+            track = SeverityTrack(fault, settings)
             for e in self.estimates:
-                track.add(float(e.k[j]))
-            if track.severity > Severity.OK and k[j] < levels[0]:
+                track.add(float(e.k[j]), float(e.sd[j]))
+            if track.severity and k[j] < settings.faults[fault].watch:
                 found.append(fault)
         return found
 
