@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Message, Schema
-from mcap.writer import CompressionType, Writer
+from mcap.records import Channel, Schema
 
 from ema.core.errors import LogError
 
-from .scan import UNREADABLE, Damage, McapFile
+from .ledger import Missing
+from .numbered import NumberedWriter
+from .records import UNREADABLE, Block, parse
+from .scan import Damage, McapFile
+
+_TOLD = 20  # damages named in the copy
 
 
 class Recovered(NamedTuple):
@@ -27,6 +29,36 @@ class Recovered(NamedTuple):
     first_ns: int | None
     last_ns: int | None
     damage: list[Damage]
+    missing: list[Missing]
+
+
+class Verdict(NamedTuple):
+    """What a file says of itself, compared with what is in it."""
+
+    finished: bool
+    damage: list[Damage]
+
+    @property
+    def is_sound(self) -> bool:
+        """Closed properly, and nothing contradicts anything."""
+        return self.finished and not self.damage
+
+
+def examine(path: Path) -> Verdict:
+    """Read all of a file. LogError when it is no MCAP file."""
+    damage: list[Damage] = []
+    file = McapFile(path, damage.append)
+    try:
+        for _ in file.blocks():
+            pass
+        return Verdict(file.finished, list(dict.fromkeys(damage)))
+    finally:
+        file.close()
+
+
+def is_sound(path: Path) -> bool:
+    """Whether a file was closed properly and is all that it says. LogError when it is no MCAP file."""
+    return examine(path).is_sound
 
 
 def recover(source: Path, target: Path) -> Recovered:
@@ -41,14 +73,17 @@ def recover(source: Path, target: Path) -> Recovered:
     file = McapFile(source, damage.append)
     try:
         with _new(target) as output:
-            count, first, last = _copy(file, output)
+            copy = _Copy(file, output)
+            for block in file.blocks():
+                copy.add(block)
+            copy.finish(list(dict.fromkeys(damage)))
     except FileExistsError as error:
         raise LogError(f"{target}: exists, and is not overwritten") from error
     except OSError as error:
         raise LogError(f"{target}: cannot be written ({error.strerror})") from error
     finally:
         file.close()
-    return Recovered(source, target, count, first, last, list(dict.fromkeys(damage)))
+    return Recovered(source, target, copy.count, copy.first, copy.last, list(dict.fromkeys(damage)), file.missing)
 
 
 @contextmanager
@@ -63,68 +98,70 @@ def _new(target: Path) -> Iterator[BinaryIO]:
         raise
 
 
-def is_sound(path: Path) -> bool:
-    """Whether a file was closed properly and every chunk in it is whole. LogError when it is no MCAP file."""
-    damage: list[Damage] = []
-    file = McapFile(path, damage.append)
-    try:
-        for _ in file.blocks():
-            if damage:
-                break
-        return file.finished and not damage
-    finally:
-        file.close()
+class _Copy:
+    """The file that is written; numbers of schemas and channels are its own."""
 
+    def __init__(self, file: McapFile, output: BinaryIO):
+        self._file = file
+        self._writer = NumberedWriter(output)
+        self._writer.start(library="ema-monitor recover")
+        self._writer.add_metadata("ema", {**file.metadata(), "recovered_from": file.path.name})
+        for attachment in file.attachments():
+            self._writer.add_attachment(
+                attachment.create_time, attachment.log_time, attachment.name, attachment.media_type, attachment.data
+            )
+        self._schemas: dict[int, int] = {0: 0}
+        self._channels: dict[int, int] = {}
+        self._made: dict[tuple[object, ...], int] = {}
+        self.count = 0
+        self.first: int | None = None
+        self.last: int | None = None
 
-def _copy(file: McapFile, output: Any) -> tuple[int, int | None, int | None]:
-    writer = Writer(output, compression=CompressionType.ZSTD)
-    writer.start(library="ema-monitor recover")
-    writer.add_metadata("ema", {**file.metadata(), "recovered_from": file.path.name})
-    for attachment in file.attachments():
-        writer.add_attachment(
-            attachment.create_time, attachment.log_time, attachment.name, attachment.media_type, attachment.data
-        )
-    schemas: dict[int, int] = {0: 0}
-    channels: dict[int, int] = {}
-    count, first, last = 0, None, None
-    for offset, records in file.blocks():
-        for record in _parse(records):
-            if record is None:
-                file.note(offset, "a record in a chunk cannot be read")
-            elif isinstance(record, Schema):
-                if record.id not in schemas:
-                    schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
-            elif isinstance(record, Channel):
-                if record.id not in channels:
-                    schema = schemas.get(record.schema_id, 0)
-                    channels[record.id] = writer.register_channel(
-                        record.topic, record.message_encoding, schema, record.metadata
-                    )
-            elif record.channel_id not in channels:
-                file.note(offset, f"channel {record.channel_id} is not defined")
-            else:
-                writer.add_message(
-                    channels[record.channel_id], record.log_time, record.data, record.publish_time, record.sequence
-                )
-                count += 1
-                first = record.log_time if first is None else min(first, record.log_time)
-                last = record.log_time if last is None else max(last, record.log_time)
-    writer.finish()
-    return count, first, last
+    def add(self, block: Block) -> None:
+        """Take all messages of a block."""
+        for place in block.definitions:
+            try:
+                self._define(place.opcode, block.data[place.begin : place.end])
+            except UNREADABLE:
+                self._file.note(block.offset, "a schema or channel cannot be read")
+        for message in block.messages:
+            if message.channel not in self._channels:
+                self._from_summary(message.channel, block.offset)
+            if message.channel in self._channels:
+                self._writer.add(self._channels[message.channel], message.t_ns, block.data[message.begin : message.end])
+                self.count += 1
+                self.first = min(self.first or message.t_ns, message.t_ns)
+                self.last = max(self.last or message.t_ns, message.t_ns)
 
+    def finish(self, damage: list[Damage]) -> None:
+        """Say in the copy what is missing in it, and end it."""
+        if damage:
+            told = [f"byte {one.offset}: {one.what}" for one in damage[:_TOLD]]
+            self._writer.add_metadata("ema", {"damage_of_the_original": "; ".join(told)})
+        self._writer.finish()
 
-def _parse(records: bytes) -> Iterator[Schema | Channel | Message | None]:
-    """Schemas, channels and messages of a chunk; None for one that cannot be read."""
-    stream = io.BytesIO(records)
-    while len(head := stream.read(9)) == 9:
-        opcode, length = head[0], int.from_bytes(head[1:], "little")
-        content = ReadDataStream(io.BytesIO(stream.read(min(length, len(records)))))
-        try:
-            if opcode == Opcode.SCHEMA:
-                yield Schema.read(content)
-            elif opcode == Opcode.CHANNEL:
-                yield Channel.read(content)
-            elif opcode == Opcode.MESSAGE:
-                yield Message.read(content, length)
-        except UNREADABLE:
-            yield None
+    def _define(self, opcode: int, content: bytes) -> None:
+        if opcode == Opcode.SCHEMA:
+            schema = parse(Schema, content)
+            new = (schema.name, schema.encoding, schema.data)
+            if new not in self._made:
+                self._made[new] = self._writer.register_schema(*new)
+            self._schemas[schema.id] = self._made[new]
+        else:
+            channel = parse(Channel, content)
+            self._channel(channel, self._schemas.get(channel.schema_id, 0))
+
+    def _channel(self, channel: Channel, schema: int) -> None:
+        new = (channel.topic, channel.message_encoding, schema, tuple(channel.metadata.items()))
+        if new not in self._made:
+            self._made[new] = self._writer.register_channel(
+                channel.topic, channel.message_encoding, schema, channel.metadata
+            )
+        self._channels[channel.id] = self._made[new]
+
+    def _from_summary(self, number: int, offset: int) -> None:
+        """A channel whose definition was in a damaged chunk: a finished file repeats it at the end."""
+        for opcode, content in self._file.repeated_definitions():
+            self._define(opcode, content)
+        if number not in self._channels and (topic := self._file.topic(number, offset)):
+            self._channel(Channel(number, topic, "json", {}, 0), 0)

@@ -1,37 +1,30 @@
 """Messages of one MCAP file, whole, unfinished or damaged.
 
 The `mcap` library reads the summary of a finished file, or stops at the first damage. This scanner needs no summary,
-skips chunks outside the time range without decompressing them, checks every chunk's CRC, and after damage goes on at
-the next sound chunk. It holds one chunk in memory.
+skips chunks outside the time range without decompressing them, checks what it reads against all that the file says of
+itself (own lengths of records, CRCs, indexes, running numbers, the summary), and after damage goes on at the next sound
+record. It holds one chunk in memory.
 """
 
 from __future__ import annotations
 
 import io
-import struct
-import zlib
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-import zstandard
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata
-from mcap.writer import MCAP0_MAGIC
 
 from ema.core.errors import LogError
 
-_RECORD = struct.Struct("<BQ")  # opcode, length of the content
-_CHUNK = struct.Struct("<QQQII")  # first and last time, size and CRC uncompressed, length of the compression's name
-_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-_COMPRESSION_AT = _RECORD.size + _CHUNK.size - 4  # of a chunk record: where resynchronisation looks for "zstd"
-_COMPRESSION_MARK = b"\x04\x00\x00\x00zstd"
-_LIMIT = 256 << 20  # larger chunks and attachments are damage, not data
-_BLOCK = 1 << 20
-_FOOTER_SIZE = _RECORD.size + 20 + len(MCAP0_MAGIC)
-UNREADABLE = (McapError, struct.error, ValueError, OverflowError, zstandard.ZstdError)
+from . import records as at_rest
+from .ledger import Ledger, Missing
+from .numbered import CHANNELS
+from .records import LIMIT, UNREADABLE, Block, ChunkHead, Place, parse
+from .summary import Summary, contradictions, is_finished, read_summary
+from .walk import DataSection, Index
 
 
 class RawMessage(NamedTuple):
@@ -42,22 +35,8 @@ class RawMessage(NamedTuple):
     data: bytes
 
 
-class _Record(NamedTuple):
-    opcode: int
-    offset: int
-    length: int  # of the content
-
-    @property
-    def begin(self) -> int:
-        return self.offset + _RECORD.size
-
-    @property
-    def end(self) -> int:
-        return self.begin + self.length
-
-
 class Damage(NamedTuple):
-    """A place in a file that could not be read."""
+    """A place in a file that could not be read, or contradicts the rest."""
 
     path: Path
     offset: int
@@ -77,6 +56,11 @@ class McapFile:
     report : callable
         Called with every `Damage` met.
 
+    Attributes
+    ----------
+    missing : list of Missing
+        Messages that were written and cannot be read; known when all blocks have been read.
+
     Raises
     ------
     LogError
@@ -87,15 +71,16 @@ class McapFile:
         self.path = path
         self._report = report
         self._topics: dict[int, str] = {}
+        self._searched = False
+        self.missing: list[Missing] = []
         try:
             self._file = path.open("rb")
             self._size = self._file.seek(0, io.SEEK_END)
         except OSError as error:
             raise LogError(f"{path}: cannot be read ({error.strerror})") from error
-        self._begin = len(MCAP0_MAGIC)
-        if self._read(0, len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-            self._begin = self._next_chunk(0)
-            if self._begin == self._size:
+        self._data = DataSection(self._size, self._read, self.note)
+        if not self._data.is_marked:
+            if self._data.begin >= self._size:
                 self.close()
                 raise LogError(f"{path}: is not an MCAP file" + (" (it is empty)" if self._size == 0 else ""))
             self.note(0, "does not begin as an MCAP file")
@@ -107,17 +92,20 @@ class McapFile:
     @property
     def finished(self) -> bool:
         """Whether the file was closed properly: a footer and the magic at its end."""
-        end = self._read(max(0, self._size - _FOOTER_SIZE), _FOOTER_SIZE)
-        return end[:1] == bytes([Opcode.FOOTER]) and end.endswith(MCAP0_MAGIC)
+        return is_finished(self._size, self._read)
 
     def first_time(self) -> int | None:
         """Time of the first chunk's first message, None when there is none. [ns]"""
-        for record in self._records():
-            head = self._read(record.begin, _CHUNK.size)
-            if record.opcode == Opcode.CHUNK and len(head) == _CHUNK.size:
-                return int(_CHUNK.unpack(head)[0])
-            if record.opcode == Opcode.MESSAGE and record.length >= _MESSAGE.size:
-                return int(_MESSAGE.unpack_from(head)[2])
+        for place in self._data.places():
+            if place.opcode == Opcode.CHUNK and (head := at_rest.chunk_head(place, self._read)):
+                if _vouched(head, self._data.index(place.end)[0]):
+                    return head.first_ns
+                data = at_rest.chunk_data(place, head, self._read)
+                times = [message.t_ns for message in at_rest.block(place.offset, data).messages] if data else []
+                if times:
+                    return min(times)
+            elif place.opcode == Opcode.MESSAGE:
+                return int(at_rest.MESSAGE.unpack(self._read(place.begin, at_rest.MESSAGE.size))[2])
         return None
 
     def messages(
@@ -125,142 +113,175 @@ class McapFile:
     ) -> Iterator[RawMessage]:
         """Messages in the order of the file whose topic is `wanted` and whose time is in [start_ns, end_ns)."""
         low, high = start_ns or 0, 2**64 if end_ns is None else end_ns
-        chosen: dict[int, bool] = {}
-        for offset, records in self.blocks(low, high):
-            yield from self._pick(records, offset, chosen, wanted, low, high)
+        chosen: dict[str, bool] = {}
+        for block in self.blocks(low, high):
+            for message in block.messages:
+                topic = self.topic(message.channel, block.offset)
+                take = chosen.get(topic)
+                if take is None:
+                    take = chosen[topic] = bool(topic) and wanted(topic)
+                if take and low <= message.t_ns < high:
+                    yield RawMessage(topic, message.t_ns, block.data[message.begin : message.end])
 
-    def blocks(self, start_ns: int = 0, end_ns: int = 2**64) -> Iterator[tuple[int, bytes]]:
-        """Offset and decompressed records of every sound chunk that overlaps the time range, and of records outside."""
-        at = self._begin
-        while record := self._record(at):
-            at = record.end
-            if record.opcode == Opcode.CHUNK:
-                records = self._chunk(record, start_ns, end_ns)
-                if records is None:
-                    self.note(record.offset, "a chunk is damaged")
-                    at = self._next_chunk(record.offset + 1)
-                elif records:
-                    yield record.offset, records
-            elif record.opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
-                yield record.offset, self._read(record.offset, record.end - record.offset)
+    def blocks(self, start_ns: int = 0, end_ns: int = 2**64) -> Iterator[Block]:
+        """Records of every sound chunk that overlaps the time range, and records outside of chunks.
+
+        Behind the last one all is compared with what the file says of itself; see `missing`.
+        """
+        ledger = Ledger()
+        alone = True
+
+        def another() -> None:
+            nonlocal alone
+            alone = False
+            ledger.again()
+
+        before: Index = {}
+        behind, n_attachments = 0, 0
+        for place in self._data.places(another):
+            if place.opcode == Opcode.CHUNK:
+                index, behind = self._data.index(place.end)
+                block = self._chunk(place, index, ledger, start_ns, end_ns)
+                before = _index_of(block) if block else {}
+            elif place.opcode == Opcode.MESSAGE_INDEX:
+                channel, entries = at_rest.message_index(place, self._read)
+                if place.offset >= behind and before.get(channel) != entries:
+                    self.note(place.offset, "a message index without its chunk")
+                    ledger.lose(channel, [t_ns for t_ns, _ in entries])
+                continue
+            elif place.opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
+                block = at_rest.block(place.offset, self._read(place.offset, place.end - place.offset))
+            else:
+                n_attachments += place.opcode == Opcode.ATTACHMENT
+                continue
+            if block is not None:
+                for message in block.messages:
+                    ledger.take(message.channel, message.sequence, message.t_ns)
+                self._topics |= self._defined(block)
+                yield block
+        self._compare(ledger, n_attachments, alone)
 
     def attachments(self) -> Iterator[Attachment]:
         """Attached files."""
-        for record in self._records():
-            if record.opcode != Opcode.ATTACHMENT:
+        for place in self._data.places():
+            if place.opcode != Opcode.ATTACHMENT:
                 continue
-            content = self._read(record.begin, min(record.length, _LIMIT))
+            content = at_rest.attachment(place, self._read)
             try:
-                if zlib.crc32(content[:-4]) != int.from_bytes(content[-4:], "little"):
+                if content is None:
                     raise ValueError("CRC")
-                yield Attachment.read(ReadDataStream(io.BytesIO(content)))
+                yield parse(Attachment, content)
             except UNREADABLE:
-                self.note(record.offset, "an attachment is damaged")
+                self.note(place.offset, "an attachment is damaged")
 
     def metadata(self) -> dict[str, str]:
-        """Key-value pairs of all metadata records, joined."""
+        """Key-value pairs of the metadata records, joined."""
         pairs: dict[str, str] = {}
-        for record in self._records():
-            if record.opcode == Opcode.METADATA:
-                content = self._read(record.begin, min(record.length, _LIMIT))
+        for place in self._data.places():
+            if place.opcode == Opcode.METADATA:
                 try:
-                    pairs |= Metadata.read(ReadDataStream(io.BytesIO(content))).metadata
+                    record = parse(Metadata, self._read(place.begin, min(place.length, LIMIT)))
+                    pairs |= record.metadata if record.name != CHANNELS else {}
                 except UNREADABLE:
-                    self.note(record.offset, "metadata is damaged")
+                    self.note(place.offset, "metadata is damaged")
         return pairs
 
-    def _records(self) -> Iterator[_Record]:
-        at = self._begin
-        while record := self._record(at):
-            yield record
-            at = record.end
-
-    def _record(self, offset: int) -> _Record | None:
-        """The record at `offset`, or the next chunk behind damage; None at the end of the data section."""
-        while offset < self._size:
-            head = self._read(offset, _RECORD.size)
-            opcode, length = _RECORD.unpack(head) if len(head) == _RECORD.size else (0, 0)
-            if opcode == Opcode.DATA_END:
-                return None
-            record = _Record(opcode, offset, length)
-            if 0 < opcode < Opcode.DATA_END and record.end <= self._size:
-                return record
-            found = self._next_chunk(offset + 1)
-            at_end = found == self._size
-            self.note(offset, "ends in the middle of a record (unfinished)" if at_end else "a record is damaged")
-            offset = found
-        return None
-
-    def _chunk(self, record: _Record, low: int, high: int) -> bytes | None:
-        """Uncompressed records of a chunk: none of them when it is outside the time range, None when it is damaged."""
-        try:
-            first, last, size, crc, name_length = _CHUNK.unpack(self._read(record.begin, _CHUNK.size))
-            if last < low or first >= high:
-                return b""
-            content = self._read(record.begin + _CHUNK.size, min(record.length, _LIMIT) - _CHUNK.size)
-            data = _decompress(content[:name_length], content[name_length + 8 :], size)
-        except UNREADABLE:
-            return None
-        return data if crc in (0, zlib.crc32(data)) else None
-
-    def _pick(
-        self, records: bytes, offset: int, chosen: dict[int, bool], wanted: Callable[[str], bool], low: int, high: int
-    ) -> Iterator[RawMessage]:
-        at = 0
-        while at + _RECORD.size <= len(records):
-            opcode, length = _RECORD.unpack_from(records, at)
-            at += _RECORD.size
-            if opcode == Opcode.CHANNEL:
-                self._learn(records[at : at + length], offset)
-            elif opcode == Opcode.MESSAGE and _MESSAGE.size <= length <= len(records) - at:
-                channel, _, t_ns, _ = _MESSAGE.unpack_from(records, at)
-                take = chosen.get(channel)
-                if take is None:
-                    take = chosen[channel] = self._known(channel, offset) and wanted(self._topics[channel])
-                if take and low <= t_ns < high:
-                    yield RawMessage(self._topics[channel], t_ns, records[at + _MESSAGE.size : at + length])
-            at += length
-
-    def _learn(self, content: bytes, offset: int) -> None:
-        try:
-            channel = Channel.read(ReadDataStream(io.BytesIO(content)))
-        except UNREADABLE:
-            self.note(offset, "a channel cannot be read")
-            return
-        if channel.message_encoding == "json":
-            self._topics[channel.id] = channel.topic
-        else:
-            self._topics.setdefault(channel.id, "")
-
-    def _learn_from_summary(self) -> None:
-        at = int.from_bytes(self._read(self._size - _FOOTER_SIZE + _RECORD.size, 8), "little") if self.finished else 0
-        while 0 < at < self._size - _FOOTER_SIZE:
-            record = _Record(self._read(at, 1)[0], at, int.from_bytes(self._read(at + 1, 8), "little"))
-            if record.opcode == Opcode.CHANNEL:
-                self._learn(self._read(record.begin, record.length), at)
-            at = record.end
-
-    def _known(self, channel: int, offset: int) -> bool:
-        if channel not in self._topics:  # its definition was in a damaged chunk; a finished file repeats it at the end
-            self._learn_from_summary()
+    def topic(self, channel: int, offset: int) -> str:
+        """Topic of a channel; empty, and noted, where it is not known."""
+        if channel not in self._topics:
+            self._search_definitions()
         if channel not in self._topics:
             self.note(offset, f"channel {channel} is not defined")
-        return channel in self._topics
+        return self._topics.get(channel, "")
 
-    def _next_chunk(self, offset: int) -> int:
-        """Offset of the next plausible chunk record that begins at or after `offset`; the file's size without one."""
-        at = offset + _COMPRESSION_AT
-        while at < self._size:
-            block = self._read(at, _BLOCK + len(_COMPRESSION_MARK) - 1)
-            found = block.find(_COMPRESSION_MARK)
-            while found >= 0:
-                start = at + found - _COMPRESSION_AT
-                opcode, length = _RECORD.unpack(self._read(start, _RECORD.size))
-                if opcode == Opcode.CHUNK and start + _RECORD.size + length <= self._size:
-                    return start
-                found = block.find(_COMPRESSION_MARK, found + 1)
-            at += _BLOCK
-        return self._size
+    def repeated_definitions(self) -> list[tuple[int, bytes]]:
+        """Opcode and content of the schemas and channels that a finished file repeats at its end."""
+        return self._summary.definitions if self._summary else []
+
+    def note(self, offset: int, what: str) -> None:
+        """Report damage at a place in the file."""
+        self._report(Damage(self.path, offset, what))
+
+    @cached_property
+    def _summary(self) -> Summary | None:
+        summary = read_summary(self._size, self._read)
+        if summary is None or summary.sound or self._data.summary_at is None:
+            return summary
+        return read_summary(self._size, self._read, self._data.summary_at)  # something before it is gone, or is new
+
+    @cached_property
+    def _contradictions(self) -> list[str]:
+        summary = read_summary(self._size, self._read)
+        return contradictions(summary, self._read) if summary else []
+
+    def _chunk(self, place: Place, index: Index, ledger: Ledger, low: int, high: int) -> Block | None:
+        """Records of a chunk; None when it is outside the time range, or damaged."""
+        head = at_rest.chunk_head(place, self._read)
+        if head and (head.last_ns < low or head.first_ns >= high) and _vouched(head, index):
+            for channel, entries in index.items():
+                ledger.leave(channel, len(entries))
+            return None
+        data = at_rest.chunk_data(place, head, self._read) if head else None
+        if head is None or data is None:
+            self.note(place.offset, "a chunk is damaged")
+            for channel, entries in index.items():
+                ledger.lose(channel, [t_ns for t_ns, _ in entries])
+            return None
+        block = at_rest.block(place.offset, data)
+        times = [message.t_ns for message in block.messages] or [head.first_ns, head.last_ns]
+        if not block.whole:
+            self.note(place.offset, "a record in a chunk cannot be read")
+        if len(data) != head.size or (min(times), max(times)) != (head.first_ns, head.last_ns):
+            self.note(place.offset, "a chunk's times or size are not those of its messages")
+        if index and _by_time(index) != _by_time(_index_of(block)):
+            self.note(place.end, "an index of messages is not that of its chunk")
+        return block
+
+    def _search_definitions(self) -> None:
+        """Channels whose definition was left out or is damaged: from the summary, metadata and all chunks."""
+        if self._searched:
+            return
+        self._searched = True
+        found = []
+        for place in self._data.places():
+            if place.opcode == Opcode.METADATA:
+                found += _beside(self._read(place.begin, min(place.length, LIMIT)))
+            elif place.opcode == Opcode.CHUNK and (head := at_rest.chunk_head(place, self._read)):
+                data = at_rest.chunk_data(place, head, self._read)
+                found += self._defined(at_rest.block(place.offset, data)) if data else []
+        found += [_topic_of(channel) for channel in (self._summary.channels if self._summary else [])]
+        for number, topic in found:
+            self._topics.setdefault(number, topic)
+
+    def _defined(self, block: Block) -> list[tuple[int, str]]:
+        """Numbers and topics of the channels defined in a block."""
+        found = []
+        for place in block.definitions:
+            try:
+                if place.opcode == Opcode.CHANNEL:
+                    found.append(_topic_of(parse(Channel, block.data[place.begin : place.end])))
+            except UNREADABLE:
+                self.note(block.offset, "a channel cannot be read")
+        return found
+
+    def _compare(self, ledger: Ledger, n_attachments: int, alone: bool) -> None:
+        """Everything was read: is it what the file says of itself?"""
+        summary = self._summary
+        said = summary.statistics if summary and summary.sound and alone else None
+        counts = dict(said.channel_message_counts) if said else {}
+        if not ledger.channels | counts.keys() <= self._topics.keys():
+            self._search_definitions()
+        self.missing = ledger.missing(self._topics, counts)
+        for what in self._contradictions:
+            self.note(self._size, what)
+        for missing in self.missing:
+            self.note(self._size, str(missing))
+        if ledger.out_of_order:
+            self.note(self._size, "messages are not in the order in which they were written, or are there twice")
+        if said and (surplus := ledger.surplus(counts)):
+            self.note(self._size, f"{surplus} messages more than its summary says")
+        if said and said.attachment_count != n_attachments:
+            self.note(self._size, f"{n_attachments} attachments, its summary says {said.attachment_count}")
 
     def _read(self, offset: int, length: int) -> bytes:
         """At most `length` bytes from `offset`: fewer at the end of the file."""
@@ -270,16 +291,34 @@ class McapFile:
         except OSError as error:
             raise LogError(f"{self.path}: cannot be read at byte {offset} ({error.strerror})") from error
 
-    def note(self, offset: int, what: str) -> None:
-        """Report damage at a place in the file."""
-        self._report(Damage(self.path, offset, what))
+
+def _vouched(head: ChunkHead, index: Index) -> bool:
+    """Whether a chunk's times are those of the index behind it."""
+    times = [t_ns for entries in index.values() for t_ns, _ in entries]
+    return bool(times) and (min(times), max(times)) == (head.first_ns, head.last_ns)
 
 
-def _decompress(compression: bytes, data: bytes, size: int) -> bytes:
-    if size > _LIMIT or compression not in (b"", b"zstd"):
-        raise ValueError("chunk too large, or compressed by something else")
-    if not compression:
-        return data
-    if zstandard.frame_content_size(data) > _LIMIT:
-        raise ValueError("chunk too large")
-    return zstandard.decompress(data, max_output_size=size)
+def _index_of(block: Block) -> Index:
+    index: Index = {}
+    for message in block.messages:
+        index.setdefault(message.channel, []).append((message.t_ns, message.offset))
+    return index
+
+
+def _by_time(index: Index) -> Index:
+    return {channel: sorted(entries) for channel, entries in index.items()}
+
+
+def _topic_of(channel: Channel) -> tuple[int, str]:
+    """Number and topic; that of a channel that is not JSON is empty."""
+    return channel.id, channel.topic if channel.message_encoding == "json" else ""
+
+
+def _beside(content: bytes) -> list[tuple[int, str]]:
+    """Number and topic of the channel that a metadata record names (`numbered.NumberedWriter`)."""
+    try:
+        record = parse(Metadata, content)
+        said = record.metadata
+        return [(int(said["id"]), said["topic"] * (said["encoding"] == "json"))] if record.name == CHANNELS else []
+    except (KeyError, *UNREADABLE):
+        return []

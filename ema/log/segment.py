@@ -6,8 +6,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from mcap.writer import CompressionType, Writer
-
+from .numbered import NumberedWriter
 from .schemas import Encoded, Kind
 
 _CHUNK_SIZE = 4 << 20
@@ -48,7 +47,7 @@ class Segment:
         self.path = path
         self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
         self._tail = _Tail()
-        self._writer = Writer(self._tail, chunk_size=_CHUNK_SIZE, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
+        self._writer = NumberedWriter(self._tail, chunk_size=_CHUNK_SIZE)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self.finishing = False
@@ -81,7 +80,7 @@ class Segment:
         channel = self._channels.get(message.topic)
         if channel is None:
             channel = self._channels[message.topic] = self._register(message.kind, message.topic)
-        self._writer.add_message(channel, message.t_ns, message.data, message.t_ns)
+        self._writer.add(channel, message.t_ns, message.data)
 
     def commit(self) -> None:
         """End the chunk in progress and have everything on the disk."""
