@@ -13,8 +13,10 @@ from ema.core.closing import Closing
 from ema.core.errors import LogError
 
 from . import batches, schemas
+from .folder import is_held
 from .scan import Damage, McapFile
 
+DAMAGE_KEY = "damage_of_the_original"  # in the metadata of a recovered copy
 Paths = str | Path | Iterable[str | Path]
 
 
@@ -87,6 +89,26 @@ class LogReader(Closing):
     def unfinished(self) -> list[Path]:
         """Files that were not closed properly."""
         return [file.path for file in self._files if not file.finished]
+
+    def complaints(self) -> list[str]:
+        """What contradicts itself or may be missing, a line each; complete once everything has been read."""
+        cut = [f"{path}: was not finished: what came last may be missing" for path in self.unfinished]
+        return [*map(str, self.damage), *(cut if not self._is_being_written() else cut[:-1])]
+
+    def remarks(self) -> list[str]:
+        """What else is to be known: a log still being written, a copy of a damaged one."""
+        live = [f"{path}: is still being written" for path in self.unfinished[-1:] if self._is_being_written()]
+        copies = ((file.path, file.metadata()) for file in self._files)
+        return live + [
+            f"{path}: is a copy of {said.get('recovered_from', 'another log')}, in which was wrong: {said[DAMAGE_KEY]}"
+            for path, said in copies
+            if DAMAGE_KEY in said
+        ]
+
+    def _is_being_written(self) -> bool:
+        """Whether the last segment is unfinished because a daemon is writing it."""
+        last = self._files[-1] if self._files else None
+        return last is not None and not last.finished and is_held(last.path.parent)
 
     def messages(self, wanted: Callable[[str], bool] = lambda topic: True) -> Iterator[Message]:
         """Messages on the wanted topics, without the raw frames, in the order they were written."""

@@ -14,6 +14,7 @@ from ema.core.errors import LogError
 
 from .ledger import Missing
 from .numbered import NumberedWriter
+from .reader import DAMAGE_KEY
 from .records import UNREADABLE, Block, parse
 from .scan import Damage, McapFile
 
@@ -137,7 +138,7 @@ class _Copy:
         """Say in the copy what is missing in it, and end it."""
         if damage:
             told = [f"byte {one.offset}: {one.what}" for one in damage[:_TOLD]]
-            self._writer.add_metadata("ema", {"damage_of_the_original": "; ".join(told)})
+            self._writer.add_metadata("ema", {DAMAGE_KEY: "; ".join(told)})
         self._writer.finish()
 
     def _define(self, opcode: int, content: bytes) -> None:

@@ -7,8 +7,8 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-# A prefix, UTC to the millisecond, a running number: sorts by time.
-_NAME = re.compile(r"\d{8}T\d{9}Z-\d{4,}\.mcap")
+# A prefix, UTC to the millisecond, a running number. The number tells the order: a clock may be set.
+_NAME = re.compile(r"\d{8}T\d{9}Z-(\d{4,})\.mcap")
 
 
 def is_segment(path: Path, prefix: str) -> bool:
@@ -16,9 +16,20 @@ def is_segment(path: Path, prefix: str) -> bool:
     return path.name.startswith(prefix + "-") and _NAME.fullmatch(path.name[len(prefix) + 1 :]) is not None
 
 
+def number(path: Path) -> int:
+    """The running number in a segment's name."""
+    return int(path.stem.rpartition("-")[2])
+
+
 def segments(directory: Path, prefix: str) -> list[Path]:
-    """The writer's own segments, oldest first; other files in the directory are left alone."""
-    return sorted(path for path in directory.iterdir() if is_segment(path, prefix))
+    """The writer's own segments in the order of their numbers; other files in the directory are left alone."""
+    own = (path for path in directory.iterdir() if is_segment(path, prefix))
+    return sorted(own, key=lambda path: (number(path), path.name))
+
+
+def next_number(directory: Path, prefix: str) -> int:
+    """Greater than that of every segment there is, whichever run wrote it."""
+    return max(map(number, segments(directory, prefix)), default=0) + 1
 
 
 def free_space(directory: Path) -> int:
@@ -33,15 +44,17 @@ def prune(
     current: Path | None,
     keep_segments: int,
     keep_free: int,
+    keep_least: int,
     free_space: Callable[[Path], int] = free_space,
 ) -> list[Path]:
-    """Delete the oldest segments beyond a count, and while there is less free space than `keep_free`. [B]
+    """Delete the segments of the lowest numbers beyond a count, and while less than `keep_free` [B] is free.
 
-    `current` is never deleted. Returns what was deleted.
+    `current` and the `keep_least` segments of the highest numbers are never deleted: a disk filled by others stops the
+    log, it does not eat it. Returns what was deleted.
     """
     old = [path for path in segments(directory, prefix) if path != current]
     deleted = []
-    while old and (len(old) + 1 > keep_segments or free_space(directory) < keep_free):
+    while len(old) + 1 > keep_least and (len(old) + 1 > keep_segments or free_space(directory) < keep_free):
         path = old.pop(0)
         path.unlink(missing_ok=True)
         deleted.append(path)

@@ -19,6 +19,7 @@ from ema.core.version import version
 
 from . import contents, retention, schemas
 from .batches import Batcher
+from .folder import FolderLock
 from .schemas import Encoded
 from .segment import Segment
 from .settings import LogSettings
@@ -73,6 +74,7 @@ class SegmentedLog:
         self._batchers: dict[str, Batcher] = {}
         self._segment: Segment | None = None
         self._number = 0
+        self._lock = FolderLock(directory)
         self._opened_at = self._flushed_at = self._troubled_at = clock
         self._dropped_before = 0
         if not directory.is_dir():
@@ -81,6 +83,7 @@ class SegmentedLog:
             self._open(t_ns, clock)
         except OSError as error:
             if error.errno not in _NO_ROOM:
+                self._lock.release()
                 raise LogError(f"log directory {directory} cannot be written ({error.strerror})") from error
             self._trouble(error, clock)
 
@@ -132,14 +135,16 @@ class SegmentedLog:
     def close(self) -> None:
         """Finish the current segment. LogError when the device does not take it; the file is readable all the same."""
         segment, self._segment = self._segment, None
-        if segment is None:
-            return
         try:
-            self._collect_frames(segment)
-            segment.finish()
+            if segment is not None:
+                self._collect_frames(segment)
+                segment.finish()
         except OSError as error:
-            segment.abandon()
-            raise LogError(f"{segment.path}: could not be finished ({error.strerror})") from error
+            if segment is not None:
+                segment.abandon()
+                raise LogError(f"{segment.path}: could not be finished ({error.strerror})") from error
+        finally:
+            self._lock.release()
 
     def _open_segment(self) -> Segment | None:
         """The segment that takes messages now; None where they must be dropped."""
@@ -155,7 +160,13 @@ class SegmentedLog:
             _logger.warning("segment %s was deleted under the log", segment.path)
             self._drop_segment()
         for path in retention.prune(
-            self.directory, self._prefix, self.path, self.settings.keep_segments, keep_free, self._free_space
+            self.directory,
+            self._prefix,
+            self.path,
+            self.settings.keep_segments,
+            keep_free,
+            self.settings.keep_least,
+            self._free_space,
         ):
             _logger.info("deleted old segment %s", path)
         if self._free_space(self.directory) < keep_free:
@@ -174,7 +185,8 @@ class SegmentedLog:
         return segment.finishing or aged or segment.size >= self.settings.segment_size * _MB
 
     def _open(self, t_ns: int, clock: float) -> None:
-        self._number += 1
+        self._lock.hold()
+        self._number = max(self._number + 1, retention.next_number(self.directory, self._prefix))
         moment = datetime.fromtimestamp(t_ns / 1e9, UTC)
         name = f"{self._prefix}-{moment:%Y%m%dT%H%M%S}{moment.microsecond // 1000:03d}Z-{self._number:04d}.mcap"
         metadata = {"software": version(), **self._metadata, "segment": str(self._number)}

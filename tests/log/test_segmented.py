@@ -239,3 +239,54 @@ def test_data_is_on_the_disk_within_the_flush_interval_and_not_only_at_the_end(t
     with LogReader(tmp_path) as back:
         assert sum(len(b.frames) for b in back.frames()) == 10
         assert len(back.unfinished) == 1
+
+
+def test_two_writers_never_share_a_folder(tmp_path, make):
+    log = _open(tmp_path)
+    with pytest.raises(LogError, match=rf"{tmp_path} cannot be written \(another monitor is writing there"):
+        _open(tmp_path)
+    log.close()
+    second = _open(tmp_path)
+    second.close()
+
+
+def test_a_reader_knows_a_log_that_is_being_written_from_one_that_was_cut_off(tmp_path, make):
+    log = _open(tmp_path)
+    _write(log, make, [0], 1.0)
+    with LogReader(tmp_path) as back:
+        assert back.complaints() == []
+        assert back.remarks() == [f"{log.path}: is still being written"]
+    log._lock.release()  # as the kernel does where a process ends
+    with LogReader(tmp_path) as back:
+        assert back.complaints() == [f"{log.path}: was not finished: what came last may be missing"]
+
+
+@pytest.mark.parametrize("years", [-20, 20])
+def test_a_clock_that_jumps_by_years_never_deletes_the_newest(tmp_path, make, years):
+    """Segments go by their running number, over several runs of the daemon as well."""
+    settings = {"segment_time": 1, "keep_segments": 3}
+    jump = int(years * 365.25 * 86400e9)
+    cycle = 0
+    for run in range(3):
+        log = SegmentedLog(tmp_path, {}, LogSettings(keep_free=0, **settings), T0 + jump * (run % 2), 0.0)
+        for second in range(4):
+            log.write(schemas.ESTIMATE.encode(make.estimate(cycle)))
+            log.tick(T0 + jump * ((run + second) % 2), float(second + 1))
+            cycle += 1
+        log.close()
+        with LogReader(tmp_path) as back:
+            kept = sorted(m.content["cycle"] for m in back.messages())
+        assert kept == list(range(cycle - len(kept), cycle))
+        assert len(kept) >= 2
+
+
+def test_a_disk_filled_by_others_does_not_eat_the_log(tmp_path, make):
+    room = [10**12]
+    log = _open(tmp_path, lambda directory: room[0], segment_time=1, keep_least=4)
+    for second in range(6):
+        _write(log, make, [second], float(second))
+    room[0] = 0
+    for second in range(6, 12):
+        _write(log, make, [second], float(second))
+    assert log.state is LogState.FULL
+    assert len(list(tmp_path.glob("*.mcap"))) == 4
