@@ -52,6 +52,8 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
     from ema.discrepancy.extended import write_extended
     from ema.discrepancy.report import write_report
 
+    from .integrity import tell
+
     kind = config.read_yaml(plant_file).get("kind")
     if kind not in EXAMINERS:
         raise ConfigError(f"{plant_file}: key 'kind' = {kind!r}: must be one of {', '.join(EXAMINERS)}")
@@ -71,7 +73,8 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
             status.update(text)
 
         findings, draw = examiner.discrepancy(plant_file, read, say)
-        findings.notes.extend([*_left_out(read, cycles), *empty])
+        complaints = [line for record in read for line in record.complaints]
+        findings.notes.extend([*_left_out(read, cycles), *empty, *complaints])
         findings.write(findings_file)
         found = [*findings.effects, *findings.unnamed]
         write_extended(plant_file, found, extended, findings.fitted)
@@ -86,6 +89,7 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
         for note in findings.notes:
             click.echo(f"- {note}")
         click.echo(f"{report}")
+    tell(complaints, [], list(records))
 
 
 def _plan(plant_file: Path) -> Sidecar | None:

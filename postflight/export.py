@@ -49,6 +49,7 @@ def export(
       ema export flight.mcap --out records --what cycles
       ema export flight.mcap --out flight.blf --start 10 --end 20
     """
+    from .integrity import conclude
     from .open_log import open_log, open_mcap
 
     if out.suffix:
@@ -56,6 +57,7 @@ def export(
             raise click.UsageError("--what names tables, and those need a directory as --out")
         with open_log(logs, start, end) as log:
             click.echo(f"{out}: {_frames(log, out)} frames")
+            conclude(log)
             return
     from .table_files import TableFiles
     from .tables import codec_of, cycle_blocks, message_blocks, signal_blocks
@@ -72,10 +74,9 @@ def export(
                 files.write(block)
         for path, rows in files.rows.items():
             click.echo(f"{path}: {rows} rows")
-        for damage in log.damage:
-            click.echo(f"{damage}", err=True)
         if not files.rows:
             raise LogError(f"{', '.join(str(path) for path in logs)}: nothing of {', '.join(sorted(wanted))} in it")
+        conclude(log)
 
 
 def _frames(log: LogReader | ForeignLog, out: Path) -> int:

@@ -23,7 +23,7 @@ def identify(bundle: Path, method: str, as_json: bool, records: tuple[Path, ...]
 
     With the channels theta_u and theta_m the start state of a cycle is measured, else it is left open and the
     uncertainty grows. A cycle that is not the bundle's test is said and left out. Exit status 1 if no cycle gave an
-    estimate.
+    estimate, or a log is not all that was written.
 
     \b
     Example:
@@ -36,6 +36,8 @@ def identify(bundle: Path, method: str, as_json: bool, records: tuple[Path, ...]
     from ema.identification import identifier
     from ema.identification.alignment import aligned
     from ema.identification.recorded import measurements, missing
+
+    from .integrity import tell
 
     made = ema.bundle.load(bundle)
     read = [aligned(read_record(path), made.plant) for path in each_once(records)]
@@ -52,6 +54,7 @@ def identify(bundle: Path, method: str, as_json: bool, records: tuple[Path, ...]
                 "record": record.name,
                 "missing_channels": list(missing(record)),
                 "notes": notes,
+                "complaints": list(record.complaints),
                 "cycles": cycles,
             }
         )
@@ -62,6 +65,7 @@ def identify(bundle: Path, method: str, as_json: bool, records: tuple[Path, ...]
             _say(answer)
     if all(c["status"] == Status.NOT_ESTIMATED.name.lower() for a in answers for c in a["cycles"]):
         raise NegativeAnswer("no cycle gave an estimate")
+    tell([line for record, _ in read for line in record.complaints], [], [Path(r.name) for r, _ in read])
 
 
 def _answer(number: int, e: Any) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ema.core.errors import LogError
+from ema.core.errors import LogError, NegativeAnswer
 from ema.core.folders import make_folder
 
 _SUFFIX = ".recovered.mcap"
@@ -20,8 +20,11 @@ _SUFFIX = ".recovered.mcap"
 def recover(logs: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
     """Write a finished copy, NAME.recovered.mcap, of each unfinished or damaged MCAP log.
 
-    LOG is a file or a directory of files. The log itself is never changed and nothing is overwritten; a log that is
-    finished and sound is left as it is.
+    LOG is a file or a directory of files. All that is in a log is compared with what it says of itself. The log itself
+    is never changed and nothing is overwritten; one that is finished and sound is left as it is.
+
+    Exit status 0: every log is finished and sound. 1: one was not, and its copy is there. 2: one cannot be read, or its
+    copy cannot be written.
 
     \b
     Example:
@@ -31,7 +34,7 @@ def recover(logs: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
 
     if out is not None:
         make_folder(out)
-    answers = []
+    answers: list[dict[str, object]] = []
     failures = []
     for path in find_logs(logs, (".mcap",)):
         if path.name.endswith(_SUFFIX) and path not in logs:
@@ -50,6 +53,9 @@ def recover(logs: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
         click.echo(f"ema: {failure}", err=True)
     if failures:
         raise failures[-1]
+    recovered = sum(answer.get("recovered") is not None for answer in answers)
+    if recovered:
+        raise NegativeAnswer(f"{recovered} of {len(answers)} logs were not finished and sound; copies were written")
 
 
 def _one(path: Path, target: Path) -> dict[str, object]:
@@ -67,5 +73,6 @@ def _one(path: Path, target: Path) -> dict[str, object]:
         "first_ns": found.first_ns,
         "last_ns": found.last_ns,
         "damage": [str(damage) for damage in found.damage],
+        "missing": [missing._asdict() for missing in found.missing],
         "text": "\n".join(lines),
     }

@@ -21,6 +21,7 @@ from ema.log.segment import Segment
 from .alarms_again import AlarmComparison
 from .compare import Comparison, Pair, Totals
 from .identify import Setup, identified, setup
+from .integrity import conclude
 from .open_log import names
 from .received import Log
 
@@ -64,8 +65,6 @@ def run(
     else:
         click.echo(_text(comparison, how, seconds))
         click.echo(", ".join(f"{n} {words}" for n, words in zip(alarms.counts.values(), _ALARMS, strict=True)))
-    for damage in getattr(log, "damage", []):
-        click.echo(f"{damage}", err=True)
     if how.same and not comparison.n_different and alarms.n_different:
         raise NegativeAnswer(
             f"{alarms.n_different} changes of alarms have no equal in the log, though the bundle is the same"
@@ -77,6 +76,7 @@ def run(
             f"{comparison.n_different} estimates differ from the log's by up to {largest:.2g} in k, though the bundle "
             f"is the same (log made by {made_by}, identified by {version()})"
         )
+    conclude(log)
 
 
 class _CycleTable:

@@ -87,6 +87,7 @@ def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any]) 
 
     from ema.bus.interface import open_bus, parse
 
+    from .integrity import conclude
     from .onto import Replayer
     from .open_log import names
     from .pacing import Pace
@@ -113,8 +114,6 @@ def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any]) 
             if replayer.done.n_sent + replayer.done.n_refused == before:
                 break
     done = replayer.done
-    for damage in getattr(log, "damage", []):
-        click.echo(f"{damage}", err=True)
     if done.n_sent + done.n_refused + done.n_unmapped == 0 and not stop.is_set():
         raise LogError(f"{names(log.paths)}: no frame in it is chosen")
     timed = done.n_sent > 0 and how["speed"] < float("inf")  # without waiting no frame has a time
@@ -129,7 +128,13 @@ def _send(log: Any, selection: Any, onto: tuple[str, ...], how: dict[str, Any]) 
     }
     if how["as_json"]:
         click.echo(json.dumps(answer, indent=2))
-        return
+    else:
+        _tell_sent(done, timed)
+    if not stop.is_set():
+        conclude(log)
+
+
+def _tell_sent(done: Any, timed: bool) -> None:
     late = f"; {done.late_share(0.001):.2%} more than 1 ms late, the latest {done.latest * 1e3:.1f} ms" if timed else ""
     click.echo(f"{done.n_sent} frames sent in {done.duration:.1f} s{late}")
     if done.n_refused or done.n_unmapped:

@@ -40,6 +40,7 @@ def report(
     from ema.alarms import AlarmSettings
     from ema.core import config
 
+    from .integrity import conclude
     from .open_log import open_mcap
     from .page import page
     from .report_settings import ReportSettings, of_log, shipped
@@ -51,8 +52,9 @@ def report(
     with open_mcap(logs, start, end) as log:
         settings = settings.model_copy(update={"alarms": chosen or of_log(log.attachments()) or shipped()})
         text = page(log, settings)
-    try:
-        out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise LogError(f"{out}: cannot be written ({error.strerror})") from error
-    click.echo(f"{out}: {len(text) / 1e3:.0f} kB")
+        try:
+            out.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise LogError(f"{out}: cannot be written ({error.strerror})") from error
+        click.echo(f"{out}: {len(text) / 1e3:.0f} kB")
+        conclude(log)

@@ -77,7 +77,8 @@ class Record:
     """Cycles of (possibly) unequal length with the same channels.
 
     `ignored` names the columns of the file that are not channels; `resolution` the steps of the measurement
-    where they are known [unit of the channel]; `broken` the numbers of cycles that were left out for their gaps.
+    where they are known [unit of the channel]; `broken` the numbers of cycles that were left out for their gaps;
+    `complaints` what the file contradicts itself in, a line each.
     """
 
     cycles: tuple[Cycle, ...]
@@ -85,6 +86,7 @@ class Record:
     ignored: tuple[str, ...] = ()
     resolution: Mapping[str, float] = field(default_factory=dict)
     broken: tuple[int, ...] = ()
+    complaints: tuple[str, ...] = ()
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ Registered as entry points of the groups `can.io.message_reader` and `can.io.mes
 
 from __future__ import annotations
 
+import logging
 import os
 import time
 from collections.abc import Iterator
@@ -23,6 +24,7 @@ from .reader import LogReader
 from .schemas import FRAMES
 from .segment import Segment
 
+_logger = logging.getLogger("ema.log")
 _FLUSH_INTERVAL = 1.0  # [s]
 
 
@@ -47,6 +49,8 @@ class McapReader(MessageReader):
         for bus, frames in self._log.frames():
             for frame in frames:
                 yield message(frame, bus or None)
+        for line in (*self._log.remarks(), *self._log.complaints()):
+            _logger.warning("%s", line)
 
     def stop(self) -> None:
         """Close the file."""

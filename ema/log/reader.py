@@ -14,6 +14,7 @@ from ema.core.errors import LogError
 
 from . import batches, schemas
 from .folder import is_held
+from .retention import newest
 from .scan import Damage, McapFile
 
 DAMAGE_KEY = "damage_of_the_original"  # in the metadata of a recovered copy
@@ -92,23 +93,18 @@ class LogReader(Closing):
 
     def complaints(self) -> list[str]:
         """What contradicts itself or may be missing, a line each; complete once everything has been read."""
-        cut = [f"{path}: was not finished: what came last may be missing" for path in self.unfinished]
-        return [*map(str, self.damage), *(cut if not self._is_being_written() else cut[:-1])]
+        cut = (path for path in self.unfinished if not _is_live(path))
+        return [*map(str, self.damage), *(f"{path}: was not finished: what came last may be missing" for path in cut)]
 
     def remarks(self) -> list[str]:
         """What else is to be known: a log still being written, a copy of a damaged one."""
-        live = [f"{path}: is still being written" for path in self.unfinished[-1:] if self._is_being_written()]
+        live = [f"{path}: is still being written" for path in self.unfinished if _is_live(path)]
         copies = ((file.path, file.metadata()) for file in self._files)
         return live + [
             f"{path}: is a copy of {said.get('recovered_from', 'another log')}, in which was wrong: {said[DAMAGE_KEY]}"
             for path, said in copies
             if DAMAGE_KEY in said
         ]
-
-    def _is_being_written(self) -> bool:
-        """Whether the last segment is unfinished because a daemon is writing it."""
-        last = self._files[-1] if self._files else None
-        return last is not None and not last.finished and is_held(last.path.parent)
 
     def messages(self, wanted: Callable[[str], bool] = lambda topic: True) -> Iterator[Message]:
         """Messages on the wanted topics, without the raw frames, in the order they were written."""
@@ -162,6 +158,11 @@ class LogReader(Closing):
 def _order(file: McapFile) -> tuple[bool, int, str]:
     first_ns = file.first_time()
     return (first_ns is None, first_ns or 0, file.path.name)
+
+
+def _is_live(path: Path) -> bool:
+    """Whether a file is the newest segment of a folder that a daemon is writing."""
+    return path == newest(path) and is_held(path.parent)
 
 
 def find_logs(paths: Paths, suffixes: tuple[str, ...]) -> list[Path]:

@@ -27,6 +27,12 @@ def segments(directory: Path, prefix: str) -> list[Path]:
     return sorted(own, key=lambda path: (number(path), path.name))
 
 
+def newest(path: Path) -> Path | None:
+    """The segment of the highest number beside a segment and of its kind; None where the file is no segment."""
+    prefix = path.name.rsplit("-", 2)[0]
+    return segments(path.parent, prefix)[-1] if is_segment(path, prefix) else None
+
+
 def next_number(directory: Path, prefix: str) -> int:
     """Greater than that of every segment there is, whichever run wrote it."""
     return max(map(number, segments(directory, prefix)), default=0) + 1

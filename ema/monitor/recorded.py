@@ -54,9 +54,10 @@ def read_mcap(path: Path, _: object = None) -> Record:
                 raise RecordError(
                     f"{path}: holds actuators {numbers}; 'ema export {path} --what cycles --out DIR' takes them apart"
                 )
+        complaints = tuple(log.complaints())
     if not found:
-        raise NoCycleError(f"{path}: no cycle without a gap in it")
-    return Record(tuple(next(iter(found.values()))), path, broken=tuple(broken))
+        raise NoCycleError("; ".join([f"{path}: no cycle without a gap in it", *complaints]))
+    return Record(tuple(next(iter(found.values()))), path, broken=tuple(broken), complaints=complaints)
 
 
 def cycles(log: LogReader, broken: list[int] | None = None) -> Iterator[tuple[int, Cycle]]:

@@ -76,6 +76,18 @@ def test_cycles_end_where_the_daemons_configuration_says(fly, coarse_bundle, tmp
         assert [cycle.number for cycle in record] == whole
 
 
+def test_what_contradicts_itself_is_said_with_the_record(fly, coarse_bundle, tmp_path):
+    path = _log(tmp_path / "log", fly(n_cycles=2, seed=4), coarse_bundle)
+    assert read_record(path).complaints == ()
+    data = bytearray(path.read_bytes())
+    data[-30] ^= 1  # in the footer
+    path.write_bytes(data)
+    record = read_record(path)
+    assert record.n_cycles == 2
+    assert len(record.complaints) == 1
+    assert str(path) in record.complaints[0]
+
+
 def test_a_log_that_does_not_say_whose_cycles_is_refused(fly, tmp_path):
     with LogWriter(tmp_path, {}, LogSettings(keep_free=0)) as log:
         log.frames(fly(n_cycles=3, seed=4)[0][1], "vcan0")
