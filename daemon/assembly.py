@@ -7,13 +7,10 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-import yaml
-
 from ema.alarms.bus import COMMAND
 from ema.bundle import Bundle
 from ema.bus.codec import Codec, default
 from ema.bus.interface import open_bus
-from ema.core.config import Settings
 from ema.log import LogSettings, LogWriter
 from ema.monitor import Monitor, Runner
 from ema.monitor.presence import Presence
@@ -22,7 +19,7 @@ from .alarming import AlarmDesk
 from .health import Health
 from .remote import RemoteRunner
 from .service import Service
-from .settings import DaemonSettings, load_alarms, load_bundles
+from .settings import DaemonSettings, load_alarms, load_bundles, text
 from .state_file import StateFile
 from .supervision import promised
 from .turn import Turn
@@ -52,8 +49,8 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     }
     attachments: dict[str, bytes | Path] = {
         codec.path.name: codec.path,
-        "daemon.yaml": _yaml(settings),
-        "alarms.yaml": _yaml(alarm_settings),
+        "daemon.yaml": text(settings),
+        "alarms.yaml": text(alarm_settings),
         **_manifests(bundles),
     }
     log_settings = LogSettings(**settings.log.model_dump(exclude={"directory"}))
@@ -84,10 +81,6 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
 def _heard(codec: Codec) -> list[tuple[int, int]]:
     """Filters of what the monitor listens to: actuators, and operators' commands with their seals."""
     return [*codec.filters("Actuator"), *codec.filters_of(COMMAND, "TesterSeal", "TesterSession")]
-
-
-def _yaml(settings: Settings) -> bytes:
-    return yaml.safe_dump(settings.model_dump(mode="json"), allow_unicode=True, sort_keys=False).encode()
 
 
 def _manifests(bundles: dict[int, Bundle]) -> dict[str, bytes]:

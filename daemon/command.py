@@ -14,11 +14,15 @@ import click
 def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
     """Watch the actuators on a bus until SIGTERM or SIGINT.
 
+    SIGHUP reads the configuration again, SIGUSR1 begins a new segment of the log, SIGUSR2 tells the state in the
+    journal, SIGQUIT the stacks of all threads.
+
     \b
     Example:
       ema daemon --config config/daemon.yaml --bus vcan0
     """
     import logging
+    import signal
     import sys
 
     # python-can and pint load these, and pandas with them, where they are installed: 80 MB that a monitor never uses.
@@ -26,26 +30,40 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
 
     from ema.bus import interface
     from ema.core.errors import EmaError, Failure, OccupiedError
-    from ema.core.stopping import on_stop
 
+    from . import signals
     from .journal import use_journal
-    from .settings import load
+    from .reload import Reloader
+    from .settings import DaemonSettings, load
 
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(message)s")
     use_journal()
-    settings = load(config_path)
-    if bus is not None:
-        settings = settings.model_copy(update={"bus": interface.elsewhere(settings.bus, bus)})
-    if log_path is not None:
-        log = settings.log.model_copy(update={"directory": str(Path(log_path).resolve())})
-        settings = settings.model_copy(update={"log": log})
+
+    def read() -> DaemonSettings:
+        settings = load(config_path)
+        if bus is not None:
+            settings = settings.model_copy(update={"bus": interface.elsewhere(settings.bus, bus)})
+        if log_path is not None:
+            log = settings.log.model_copy(update={"directory": str(Path(log_path).resolve())})
+            settings = settings.model_copy(update={"log": log})
+        return settings
+
+    settings = read()
 
     from .assembly import assembled
 
     started = False
     try:
         with assembled(settings) as service:
-            on_stop(service.stop)
+            reloader = Reloader(settings, read, service.log)
+            signals.decide(
+                {
+                    **dict.fromkeys(signals.STOPPING, service.stop),
+                    signal.SIGHUP: lambda: service.ask(lambda: service.reload(reloader)),
+                    signal.SIGUSR1: lambda: service.ask(service.cut_log),
+                    signal.SIGUSR2: lambda: service.ask(service.tell),
+                }
+            )
             started = True
             service.run()
     except OccupiedError:

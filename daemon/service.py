@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Mapping
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
@@ -34,6 +35,7 @@ from .arrival import Arrival
 from .health import Health
 from .memory import settle
 from .notify import notify
+from .reload import Reloader
 from .sinks import BusSink, LogSink
 from .supervision import LOOK, SupervisionSettings
 from .turn import Turn
@@ -94,6 +96,31 @@ class Service:
         self._asked_ns = 0  # time of the cycle that the arbiter has been asked about for longest
         self._stuck = False
         self._stopping = False
+        self._asked: deque[Callable[[], None]] = deque()
+
+    @property
+    def log(self) -> LogWriter:
+        """The log that is written."""
+        return self._log
+
+    def ask(self, what: Callable[[], None]) -> None:
+        """Have the loop do something at its next turn; may be called from a signal handler."""
+        self._asked.append(what)
+
+    def tell(self) -> None:
+        """An event with the state and every counter, for a person at the journal."""
+        counters = ", ".join(f"{name} {count}" for name, count in self._health.counters.items() if count)
+        self._event(Level.INFO, "state", f"{self._health.state.name.lower()}; {counters or 'nothing counted yet'}")
+
+    def reload(self, reloader: Reloader) -> None:
+        """Read the configuration again and say what came of it."""
+        taken, words = reloader.reload()
+        self._event(Level.INFO if taken else Level.WARNING, "reloaded" if taken else "reload_refused", words)
+
+    def cut_log(self) -> None:
+        """Finish the log's segment and begin another."""
+        self._log.cut()
+        self._event(Level.INFO, "log_cut", "the log begins a new segment")
 
     def stop(self) -> None:
         """End the loop at its next turn; may be called from a signal handler."""
@@ -113,6 +140,8 @@ class Service:
             if frames.size:
                 self._ingest(frames)
                 urgent = self._monitor.ends_within(self._near)
+            while self._asked:
+                self._asked.popleft()()
             if not urgent:
                 self._work_off()
                 self._answer_jobs(self._workers.values())

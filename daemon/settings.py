@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+import yaml
 from pydantic import Field, model_validator
 
 from ema.alarms import AlarmSettings
@@ -88,6 +89,11 @@ class DaemonSettings(Settings):
                     f"monitor.slower: the DBC has no message for estimates of '{method}', only of {', '.join(told)}"
                 )
         return self
+
+
+def text(settings: Settings) -> bytes:
+    """A configuration as it is kept in the log."""
+    return yaml.safe_dump(settings.model_dump(mode="json"), allow_unicode=True, sort_keys=False).encode()
 
 
 def load(path: Path) -> DaemonSettings:

@@ -22,14 +22,15 @@ def hf_worker(config_path: Path, socket_path: Path | None) -> None:
     Example:
       ema hf-worker --config /etc/ema/vcan0.yaml
     """
+    import signal
     import threading
 
     from ema.core.errors import ConfigError
     from ema.core.status import Reason
-    from ema.core.stopping import on_stop
     from ema.identification import Measurement
     from ema.monitor import Job
 
+    from . import signals
     from .notify import notify
     from .settings import load, load_bundles
     from .worker_process import Server
@@ -40,7 +41,7 @@ def hf_worker(config_path: Path, socket_path: Path | None) -> None:
         raise ConfigError(f"{config_path}: key 'remote.hf' is missing: the worker's socket (or give --socket)")
     bundles = load_bundles(settings)
     stop = threading.Event()
-    on_stop(stop.set)
+    signals.decide(dict.fromkeys(signals.STOPPING, stop.set) | {signal.SIGHUP: lambda: None})
     server = Server(Path(path), bundles)
     server.prepare([Job(0, n, 0, "hf", Measurement.complete(b.i0[b.schedule]), Reason(0)) for n, b in bundles.items()])
     notify("READY=1")

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from ema.core.errors import LogError
 
 from .times import TimeOption, time_range
-
-if TYPE_CHECKING:
-    from ema.log import LogReader
-    from ema.log.foreign import ForeignLog
 
 _TABLES = ("estimates", "envelopes", "events", "status")
 _WHAT = (*_TABLES, "signals", "cycles")
@@ -53,10 +47,12 @@ def export(
     from .open_log import open_log, open_mcap
 
     if out.suffix:
+        from .raw_logs import write_frames
+
         if what:
             raise click.UsageError("--what names tables, and those need a directory as --out")
         with open_log(logs, start, end) as log:
-            click.echo(f"{out}: {_frames(log, out)} frames")
+            click.echo(f"{out}: {write_frames(log, out)} frames, read back and compared")
             conclude(log)
             return
     from .table_files import TableFiles
@@ -77,30 +73,3 @@ def export(
         if not files.rows:
             raise LogError(f"{', '.join(str(path) for path in logs)}: nothing of {', '.join(sorted(wanted))} in it")
         conclude(log)
-
-
-def _frames(log: LogReader | ForeignLog, out: Path) -> int:
-    import can
-
-    from ema.core.can_messages import message
-
-    from .open_log import names
-
-    if out.exists():
-        raise LogError(f"{out}: exists, and is not overwritten")
-    batches = log.frames()
-    first = next(batches, None)
-    if first is None:
-        raise LogError(f"{names(log.paths)}: no frame in it")
-    count = 0
-    try:
-        with can.Logger(out) as target:
-            for bus, frames in chain([first], batches):
-                for frame in frames:
-                    target(message(frame, bus or None))
-                count += len(frames)
-    except OSError as error:
-        raise LogError(f"{out}: cannot be written ({error.strerror or error})") from error
-    except (ValueError, NotImplementedError, ImportError) as error:
-        raise LogError(f"{out}: {error}") from error
-    return count

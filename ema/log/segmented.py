@@ -74,6 +74,7 @@ class SegmentedLog:
         self._batchers: dict[str, Batcher] = {}
         self._segment: Segment | None = None
         self._number = 0
+        self._cut = False
         self._lock = FolderLock(directory)
         self._opened_at = self._flushed_at = self._troubled_at = clock
         self._dropped_before = 0
@@ -132,6 +133,12 @@ class SegmentedLog:
             if self.state is not LogState.OK:
                 self._recovered(t_ns, clock)
 
+    def cut(self, settings: LogSettings | None = None, attachments: Mapping[str, bytes] | None = None) -> None:
+        """Have the next flush begin a new segment, with other settings and attachments where they are given."""
+        self.settings = settings or self.settings
+        self._attachments |= attachments or {}
+        self._cut = True
+
     def close(self) -> None:
         """Finish the current segment. LogError when the device does not take it; the file is readable all the same."""
         segment, self._segment = self._segment, None
@@ -182,7 +189,7 @@ class SegmentedLog:
 
     def _is_due(self, segment: Segment, clock: float) -> bool:
         aged = clock - self._opened_at >= self.settings.segment_time
-        return segment.finishing or aged or segment.size >= self.settings.segment_size * _MB
+        return self._cut or segment.finishing or aged or segment.size >= self.settings.segment_size * _MB
 
     def _open(self, t_ns: int, clock: float) -> None:
         self._lock.hold()
@@ -191,7 +198,7 @@ class SegmentedLog:
         name = f"{self._prefix}-{moment:%Y%m%dT%H%M%S}{moment.microsecond // 1000:03d}Z-{self._number:04d}.mcap"
         metadata = {"software": version(), **self._metadata, "segment": str(self._number)}
         self._segment = Segment(self.directory / name, t_ns, self._attachments, metadata)
-        self._opened_at = clock
+        self._opened_at, self._cut = clock, False
 
     def _collect_frames(self, segment: Segment) -> None:
         if segment.finishing:

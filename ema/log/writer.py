@@ -133,6 +133,10 @@ class LogWriter(Closing):
         """Log a copy of the heartbeat (`schemas.STATUS`)."""
         self._message(schemas.STATUS, content)
 
+    def cut(self, settings: LogSettings | None = None, attachments: Mapping[str, bytes] | None = None) -> None:
+        """Begin a new segment within a flush interval, from there on with these settings and changed attachments."""
+        self._put(0, 0, lambda: self._log.cut(settings, attachments))
+
     def close(self) -> None:
         """Write what waits and finish the segment. LogError when the device does not take it."""
         if self._stopping:
