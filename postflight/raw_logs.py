@@ -18,7 +18,7 @@ from .open_log import names
 
 # What a frame is. Its direction and the channel's name are not: most formats have numbers for channels.
 _KIND = int(FrameFlag.EXTENDED | FrameFlag.REMOTE | FrameFlag.ERROR | FrameFlag.FD | FrameFlag.BRS | FrameFlag.ESI)
-_ALL = ".asc, .blf, .log, .mf4 or .mcap"
+_MORE = ".blf, .mf4 or .mcap"  # hold every frame there is
 
 
 def write_frames(log: LogReader | ForeignLog, out: Path) -> int:
@@ -78,7 +78,7 @@ def _compare(log: LogReader | ForeignLog, path: Path, out: Path) -> None:
                 wrong = np.flatnonzero(_different(frames[:n], found[:n]))
                 if len(wrong) or n < len(frames):
                     first = int(wrong[0]) if len(wrong) else n
-                    raise LogError(f"{out}: cannot hold {_words(frames[first])} (frame {at + first}); choose {_ALL}")
+                    raise LogError(f"{out}: cannot hold {_words(frames[first])} (frame {at + first}); choose {_MORE}")
                 at += n
             if len(_take(held, 1)):
                 raise LogError(f"{out}: holds more frames than were written to it")
