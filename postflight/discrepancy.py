@@ -21,16 +21,22 @@ EXAMINERS = {"ema": "ema.discrepancy.actuator", "axis": "ema.discrepancy.axis"}
 
 
 @click.command(short_help="What the simulation gets wrong: name the cause, extend the model, measure the gain.")
-@click.argument("records", metavar="RECORD...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option(
-    "--plant", "plant_file", required=True, type=click.Path(path_type=Path), help="plant YAML (kind: ema or axis)"
-)
+@click.argument("records", metavar="RECORD...", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--plant", "plant_file", type=click.Path(path_type=Path), help="plant YAML (kind: ema or axis)")
 @click.option(
     "--out", required=True, type=click.Path(path_type=Path), help="folder of findings.json, report.html, extended.yaml"
 )
 @click.option("--cycles", metavar="N,N,…", help="these cycles only, as an event 'model in doubt' names them")
 @click.option("--json", "as_json", is_flag=True, help="print findings.json instead of sentences")
-def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: str | None, as_json: bool) -> None:
+@click.option("--explain", metavar="EFFECT", help="why not this effect? Without records: of the findings in --out")
+def discrepancy(
+    records: tuple[Path, ...],
+    plant_file: Path | None,
+    out: Path,
+    cycles: str | None,
+    as_json: bool,
+    explain: str | None,
+) -> None:
     """Compare measured RECORDs with the simulation of the plant, and say what it gets wrong and why.
 
     A RECORD is a CSV file, a log, or a directory of logs.
@@ -43,17 +49,24 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
       ema discrepancy --plant config/actuator.yaml flight.csv --out findings
       ema discrepancy --plant bench.yaml sine.csv rolling.csv --out findings --json
       ema discrepancy --plant actuator.yaml log --cycles 17,18,20 --out findings
+      ema discrepancy --out findings --explain magnet_flux
     """
     from importlib import import_module
 
     from rich.console import Console
 
     from ema.core import config
+    from ema.discrepancy.explaining import read_findings, why
     from ema.discrepancy.extended import write_extended
     from ema.discrepancy.report import write_report
 
     from .integrity import tell
 
+    if explain is not None and not records:
+        click.echo(why(read_findings(out), explain))
+        return
+    if not records or plant_file is None:
+        raise click.UsageError("RECORD... and --plant are needed, but with --explain of findings that are there.")
     kind = config.read_yaml(plant_file).get("kind")
     if kind not in EXAMINERS:
         raise ConfigError(f"{plant_file}: key 'kind' = {kind!r}: must be one of {', '.join(EXAMINERS)}")
@@ -88,6 +101,8 @@ def discrepancy(records: tuple[Path, ...], plant_file: Path, out: Path, cycles: 
             click.echo(sentence)
         for note in findings.notes:
             click.echo(f"- {note}")
+        if explain is not None:
+            click.echo(why(findings.as_dict(), explain))
         click.echo(f"{report}")
     tell(complaints, [], list(records))
 
@@ -101,7 +116,7 @@ def _plan(plant_file: Path) -> Sidecar | None:
     return None if said is None else config.validate(said, Sidecar, f"{plant_file}, key 'record'")
 
 
-def _read(paths: Sequence[Path], plan: Sidecar | None) -> tuple[list[Record], list[str]]:
+def _read(paths: Sequence[Path], plan: Sidecar | None = None) -> tuple[list[Record], list[str]]:
     """The records, of directories every log in them, and what is said of logs without a whole cycle beside others."""
     from ema.core.records import each_once, read_record
     from ema.log.reader import find_logs
