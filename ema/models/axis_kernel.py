@@ -52,6 +52,7 @@ COGGING = row("cogging.amplitude")
 COMPLIANCE, J_LOAD, ZETA, LOAD_DRAG, LOAD_FRICTION = (
     row(f"gear_compliance.{name}") for name in ("compliance", "inertia", "damping", "drag", "friction")
 )
+LOAD_SHARE = row("output_load_friction.share")
 SAG, V_DC = row("supply_sag.resistance"), row("V_dc")
 
 
@@ -68,7 +69,7 @@ def torques(z, lines, terms, theta, w, i, t):
 
 
 @njit(inline="always")
-def friction(z, terms, theta, w, tau, tau_m, i, t):
+def friction(z, lines, terms, theta, w, tau, tau_m, i, t):
     """Static and sliding friction.   [N m or N]"""
     direction = 1.0 if (w if w != 0.0 else tau) > 0.0 else -1.0
     F_s = z[F_S] * static_friction(z, 0, 1, theta, w, theta, direction, tau_m)
@@ -78,6 +79,10 @@ def friction(z, terms, theta, w, tau, tau_m, i, t):
             more = torque_term.value(theta, w, i, t, terms[k])
             F_s += more
             F_d += more
+    if z[LOAD_SHARE] > 0.0:
+        more = z[LOAD_SHARE] * abs(torques(z, lines, terms, theta, 0.0, i, t))
+        F_s += more
+        F_d += more
     return max(F_s, F_d, 0.0), max(F_d, 0.0)  # what keeps sliding at creep holds at rest
 
 
@@ -239,7 +244,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
                 w_l = rubbing_speed_after(w_l, T - z[LOAD_DRAG] * w_l, z[LOAD_FRICTION], h / J_l)
                 theta_l += 0.5 * h * w_l
             w_sliding = w if slide == 0.0 else slide * max(w * slide, CREEP)
-            F_s, F_d = friction(z, terms, theta_mid, w_sliding, tau, tau_m, i, t_mid)
+            F_s, F_d = friction(z, lines, terms, theta_mid, w_sliding, tau, tau_m, i, t_mid)
             dw = (tau - F_d * slide) * h / J_m
             w_next = speed_after(w, tau, F_s, F_d, h / J_m) if slide == 0.0 else w + dw
             theta += 0.5 * h * (w + w_next)
@@ -296,7 +301,7 @@ def holding_current(z, lines, terms, theta, direction, t, out):
         i = 0.0
         for _ in range(3):  # the torque constant and load-dependent friction depend on the current they decide
             k_t = z[K_T] * emf_factor(z, 0, 1, i, z[DT])
-            _, F_d = friction(z, terms, theta[k], direction[k] * 1e-9, 0.0, k_t * i, i, t[k])
+            _, F_d = friction(z, lines, terms, theta[k], direction[k] * 1e-9, 0.0, k_t * i, i, t[k])
             i = (torques(z, lines, terms, theta[k], direction[k] * 1e-9, i, t[k]) + F_d * direction[k]) / k_t
         out[k] = i * (1.0 + z[GAIN]) + z[OFFSET]
 
@@ -329,5 +334,5 @@ def torque_along(z, lines, terms, theta, w, i, t, dT, is_force, out):
         z[DT] = dT[k]
         tau_m = i[k] if is_force else z[K_T] * emf_factor(z, 0, 1, i[k], z[DT]) * i[k]
         tau = tau_m - torques(z, lines, terms, theta[k], w[k], i[k], t[k])
-        _, F_d = friction(z, terms, theta[k], w[k], tau, tau_m, i[k], t[k])
+        _, F_d = friction(z, lines, terms, theta[k], w[k], tau, tau_m, i[k], t[k])
         out[k] = tau - (F_d if w[k] > 0.0 else -F_d)

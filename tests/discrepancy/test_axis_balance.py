@@ -11,7 +11,9 @@ import pytest
 from ema.discrepancy.axis.balance import balance
 from ema.discrepancy.axis.balance.smooth import bumps_at, local_polynomial
 from ema.discrepancy.axis.balance.telling import sentences, told
+from ema.discrepancy.axis.between import examined
 from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.wording import findings
 from ema.models.axis_config import LinearAxis, RotaryAxis
 
 
@@ -63,6 +65,23 @@ def test_viscous_friction_by_direction_is_named(positioner):
     assert "viscous friction differs by direction" in sentences(found)[0]
 
 
+def test_what_loses_one_polarity_is_a_drive_and_no_friction(axis_bench, hidden_axis):
+    bench, plant_file, motions = hidden_axis.drawn(1)
+    bench, _, rng = hidden_axis.bench_with(["one_sided_driver"], 1, bench)
+    record = axis_bench.record(bench, rng, motions=motions)
+    (term,) = told(balance(AxisPlant(RotaryAxis.model_validate(plant_file), [record])), linear=False)["terms"]
+    assert term["name"] == "drive_unequal"
+    assert term["confidence"] > 0.9
+
+
+@pytest.mark.parametrize("hidden", ["resolver_error", "inverter_drop", "saturation", "speed_delay"])
+def test_a_flaw_of_sensor_or_converter_is_no_law_of_the_balance(axis_bench, hidden_axis, hidden):
+    bench, plant_file, motions = hidden_axis.drawn(1)
+    bench, _, rng = hidden_axis.bench_with([hidden], 1, bench)
+    record = axis_bench.record(bench, rng, motions=motions)
+    assert told(balance(AxisPlant(RotaryAxis.model_validate(plant_file), [record])), linear=False)["terms"] == []
+
+
 def test_a_constant_force_comes_with_what_no_balance_tells_from_it(positioner):
     term = by_name(of_table(positioner, constant=-6.0))["constant_load"]
     assert {"asymmetric_friction", "drive_offset"} <= set(term["indistinguishable_from"])
@@ -77,6 +96,18 @@ def test_a_pendulum_and_friction_that_grows_with_load_are_named_under_a_position
     assert holds(terms["output_load_friction"]["parameters"]["share"], 0.25, room=0.03)
     assert holds(found["base"]["dry_friction"], 0.06, room=0.05)
     assert found["explained"]["fitted"] < 0.5 < 0.99 < found["explained"]["with_laws"]
+
+
+def test_free_runs_name_what_the_balance_shows_and_the_model_is_extended_by_it(positioner):
+    bench = positioner.Servo(by_load=0.25)
+    plant = AxisPlant(RotaryAxis.model_validate(positioner.servo_plant(bench)), [positioner.servo(bench, 1)])
+    found = findings(plant, examined(plant))
+    named = {e.name: e for e in found.effects}
+    assert set(named) == {"pendulum", "output_load_friction"}
+    assert all(e.confidence > 0.9 for e in named.values())
+    assert named["output_load_friction"].parameters["share"].value == pytest.approx(0.25, rel=0.05)
+    assert found.gain.heldout_after < 0.05 * found.gain.heldout_before
+    assert found.balance["free_run"]["err"] < 2.0 * found.balance["free_run"]["noise_floor"]
 
 
 def test_a_pendulum_alone_brings_no_friction_of_another_law(positioner):

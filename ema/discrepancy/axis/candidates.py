@@ -15,6 +15,7 @@ from ema.models.axis_config import LinearAxis
 from .cogging import cogging_candidate
 from .fading import fading_candidate
 from .gear import gear_candidate
+from .screened import screened
 from .stretch import stretch_candidate
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def library(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candi
         stretch_candidate(plant, s, point, blocks),
         fading_candidate(plant, s, point, blocks),
     )
-    return [*found, *(c for c in searched if c is not None)]
+    return [*found, *(c for c in searched if c is not None), *screened(plant, point)]
 
 
 def _candidate(plant: AxisPlant, s: Sizes, name: str, point: Point) -> Candidate | None:

@@ -7,6 +7,7 @@ import re
 SAID = {  # of those that begin alike the longest first
     "N m s²/rad²": "N s²/m²",
     "N m s^2/rad^2": "N s^2/m^2",
+    "N m s/rad^2": "N s/m^2",
     "N m s/rad": "N s/m",
     "N m/rad": "N/m",
     "rad/(N m)": "m/N",
@@ -14,6 +15,8 @@ SAID = {  # of those that begin alike the longest first
     "1/(N m)": "1/N",
     "kg m²": "kg",
     "kg m^2": "kg",
+    "N m/A": "N/A",
+    "1/rad": "1/m",
     "rad/s": "m/s",
     "N m": "N",
     "rad": "m",

@@ -17,6 +17,7 @@ from ema.models.axis_config import INSTANCE, Axis
 from ema.models.axis_layout import row
 
 from . import candidates, describe, structure
+from .balance import Balance, balance
 from .naming import Numbers, numbers_of
 from .noise import ESTIMATE_UNCERTAINTY
 from .pack import Pack
@@ -59,6 +60,14 @@ class AxisPlant:
             lengths = [predictable(self, b) for b in self.benches]
             self._take([bench(plant, *parts) for parts in zip(records, names, lengths, strict=True)])
         self.zeros = zeros(self)
+        self._balances: dict[str, Balance | None] = {}
+
+    @property
+    def balance(self) -> Balance | None:
+        """The regression on the balance of torque, with the drive between samples as it is taken now."""
+        if self.between not in self._balances:
+            self._balances[self.between] = balance(self)
+        return self._balances[self.between]
 
     def _take(self, benches: Sequence[Bench]) -> None:
         self.benches = tuple(benches)

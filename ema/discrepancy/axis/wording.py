@@ -10,7 +10,8 @@ from ema.discrepancy.outcome import Outcome
 from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
-from .balance import balance
+from .agreeing import together
+from .balance.as_effects import point
 from .balance.telling import sentences, told
 from .plant import AxisPlant
 
@@ -39,17 +40,19 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     if outcome.verdict != "adequate":
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
     said = _balance(plant)
+    verdict = shared.graded(outcome.verdict, gain)
+    found, added = together(plant, [_effect(e) for e in outcome.effects], verdict)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
     notes += _moved(plant, outcome) + _kinds(plant) + _zeros(plant, outcome)
     return shared.Findings(
-        shared.graded(outcome.verdict, gain),
-        [_effect(e) for e in outcome.effects],
+        verdict,
+        found,
         gain,
         structure,
         outcome.tried,
         notes,
         [asdict(r) for r in outcome.records],
-        _fitted(plant, outcome),
+        _fitted(plant, outcome) if not added else _by_balance(plant),
         rest=outcome.rest,
         balance=said,
     )
@@ -57,8 +60,19 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
 
 def _balance(plant: AxisPlant) -> dict[str, Any]:
     """The regression on the balance; empty where no stretch of motion is long enough."""
-    found = balance(plant)
-    return {} if found is None else told(found, linear=isinstance(plant.plant, LinearAxis))
+    found, linear = plant.balance, isinstance(plant.plant, LinearAxis)
+    if found is None:
+        return {}
+    run = plant.errors(point(found, linear=linear), range(len(plant.blocks)))
+    return {**told(found, linear=linear), "free_run": {"err": run.error, "noise_floor": run.noise_floor}}
+
+
+def _by_balance(plant: AxisPlant) -> dict[str, Any]:
+    """Base parameters as the balance has them, where it adds effects that free runs had terms without a name for."""
+    assert plant.balance is not None
+    own = point(plant.balance, linear=isinstance(plant.plant, LinearAxis))
+    kept = ["F_d", *(name for name in ("J", "M", "C") if name in plant.plant.fitted)]
+    return {name: float(f"{own[name]:.6g}") for name in kept if name in own}
 
 
 def _moved(plant: AxisPlant, outcome: Outcome) -> list[str]:

@@ -18,11 +18,12 @@ BASE = ("inertia", "dry_friction", "viscous_drag")
 
 @dataclass(frozen=True)
 class Plain:
-    """What the plant file says of inertia, dry friction and drag."""
+    """What the plant file says of inertia, dry friction and drag, and of the torque per current."""
 
     inertia: float
     F_d: float
     C: float
+    k_t: float = 1.0
 
 
 @dataclass(frozen=True)

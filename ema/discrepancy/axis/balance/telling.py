@@ -27,7 +27,7 @@ MADE_BY = {  # what makes a fitted value implausible
 
 def told(b: Balance, *, linear: bool) -> dict[str, Any]:
     """The balance for findings.json."""
-    drawn = _drawn(b)
+    samples = drawn(b)
     unit = "N" if linear else "N m"
     return {
         "drive_rms": _short(b.drive**0.5),
@@ -41,8 +41,8 @@ def told(b: Balance, *, linear: bool) -> dict[str, Any]:
         "noise_rms": _short(b.noise**0.5),
         "rows": len(b.model.rows.y),
         "test_function": _short(2.0 * b.model.rows.half),
-        "base": {name: _base(b, k, name, drawn, linear) for k, name in enumerate(b.model.base)},
-        "terms": [_term(b, term, drawn) for term in b.terms],
+        "base": {name: _base(b, k, name, samples, linear) for k, name in enumerate(b.model.base)},
+        "terms": [_term(b, term, samples) for term in b.terms],
     }
 
 
@@ -50,7 +50,7 @@ def _short(x: float) -> float:
     return float(f"{x:.5g}")
 
 
-def _drawn(b: Balance) -> Array:
+def drawn(b: Balance) -> Array:
     """Coefficients drawn from their uncertainty, shape (N_DRAWS, n)."""
     rng = np.random.default_rng(0)
     return rng.multivariate_normal(b.corrected.coefficients, b.corrected.covariance, N_DRAWS, method="eigh")
@@ -60,26 +60,26 @@ def _nominal(b: Balance, name: str) -> float:
     return {"inertia": b.plain.inertia, "dry_friction": b.plain.F_d, "viscous_drag": b.plain.C}[name]
 
 
-def _base(b: Balance, k: int, name: str, drawn: Array, linear: bool) -> dict[str, Any]:
+def _base(b: Balance, k: int, name: str, samples: Array, linear: bool) -> dict[str, Any]:
     nominal = _nominal(b, name)
     more = 0.0 if name == "inertia" else nominal  # friction and drag are fitted beside the plant file's
     value = float(b.corrected.coefficients[k]) + more
-    low, high = np.percentile(drawn[:, k] + more, INTERVAL)
+    low, high = np.percentile(samples[:, k] + more, INTERVAL)
     unit = in_metres(UNITS[name]) if linear else UNITS[name]
     out: dict[str, Any] = {"value": _short(value), "low": _short(low), "high": _short(high), "unit": unit}
     out["plant_file"] = nominal
-    if value < -BELOW * float(np.std(drawn[:, k])):
+    if value < -BELOW * float(np.std(samples[:, k])):
         out["implausible"] = f"{NAMES[name]} cannot be negative: it may be {MADE_BY[name]}"
     return out
 
 
-def _term(b: Balance, term: Term, drawn: Array) -> dict[str, Any]:
+def _term(b: Balance, term: Term, samples: Array) -> dict[str, Any]:
     part = b.model.part(term.law)
     values = term.law.values(b.corrected.coefficients[part])
-    samples = [term.law.values(c) for c in drawn[:, part]]
+    spreads = [term.law.values(c) for c in samples[:, part]]
     parameters = {}
     for name, unit in term.law.parameters.items():
-        spread = np.array([s[name] for s in samples])
+        spread = np.array([s[name] for s in spreads])
         if name == "phase":
             spread = values[name] + np.angle(np.exp(1j * (spread - values[name])))
         low, high = np.percentile(spread, INTERVAL)
@@ -112,6 +112,8 @@ def sentences(balance: dict[str, Any]) -> list[str]:
     out[0] += (
         f". {balance['left_rms']:.3g} {balance['unit']} rms is left, {left:.2g} times what the sensors' noise makes."
     )
+    if run := balance.get("free_run"):
+        out[0] += f" Free runs with these numbers miss {run['err']:.2%} ({run['noise_floor']:.2%} is noise)."
     implausible = [q["implausible"] for q in (*balance["base"].values(), *balance["terms"]) if "implausible" in q]
     return [*out, *(f"{text[0].upper()}{text[1:]}." for text in implausible)]
 

@@ -1,0 +1,108 @@
+"""Laws of the balance as effects of the library, which the axis model simulates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from ema.core.records import Array
+from ema.discrepancy.axis.naming import line
+from ema.discrepancy.plant import Point
+
+from .choice import Balance, Term
+
+Effects = dict[str, dict[str, float]]
+Values = Mapping[str, float]
+
+
+def effects(b: Balance, term: Term, coefficients: Array | None = None) -> Effects:
+    """Effects with their parameters; empty where the library has none that acts like this law.
+
+    `coefficients`: of the whole model, in place of those that were fitted.
+    """
+    make = _MAKERS.get(term.law.name)
+    if make is None:
+        return {}
+    c = b.corrected.coefficients if coefficients is None else coefficients
+    F_d = friction(b)
+    return (
+        {} if F_d <= 0.0 and make in _RELATIVE else make(term.law.values(c[b.model.part(term.law)]), F_d, b.plain.k_t)
+    )
+
+
+def friction(b: Balance) -> float:
+    """Dry friction as fitted, or the plant file's where that is no friction: what relative laws refer to."""
+    if "dry_friction" not in b.model.base:
+        return b.plain.F_d
+    value = b.plain.F_d + float(b.corrected.coefficients[b.model.base.index("dry_friction")])
+    return value if value > 0.0 else b.plain.F_d
+
+
+def point(b: Balance, *, linear: bool) -> Point:
+    """Everything that was fitted, as the axis model takes it; laws that it has not are left out."""
+    fitted = dict(zip(b.model.base, b.corrected.coefficients, strict=False))
+    out = {"F_d": max(b.plain.F_d + float(fitted.get("dry_friction", 0.0)), 0.0)}
+    out["C"] = b.plain.C + float(fitted.get("viscous_drag", 0.0))
+    out["M" if linear else "J"] = max(float(fitted.get("inertia", b.plain.inertia)), 0.05 * b.plain.inertia)
+    for term in b.terms:
+        for name, values in effects(b, term).items():
+            if name == "cogging":
+                A, phase = values["amplitude"], values["phase"]
+                out[line(values["order"], "cos")] = A * float(np.sin(phase))
+                out[line(values["order"], "sin")] = A * float(np.cos(phase))
+                continue
+            for parameter, value in values.items():
+                key = f"{name}.{parameter}"
+                out[key] = out.get(key, 0.0) + value if name == "constant_load" else value
+    return out
+
+
+_Maker = Callable[[Values, float, float], Effects]
+
+
+def _as_it_is(name: str, *parameters: str) -> _Maker:
+    return lambda v, _, __: {name: {p: v[p] for p in parameters}}
+
+
+def _load_friction(v: Values, F_d: float, k_t: float) -> Effects:
+    return {"load_friction": {"per_torque": v["share"] / F_d}}
+
+
+def _friction_slope(v: Values, F_d: float, k_t: float) -> Effects:
+    return {"friction_slope": {"slope": v["slope"] / F_d, "centre": v["centre"]}}
+
+
+def _stribeck(v: Values, F_d: float, k_t: float) -> Effects:
+    return {"stribeck": {"excess": v["more"] / F_d, "speed": v["speed"], "shape": v["shape"]}}
+
+
+def _stretch(v: Values, F_d: float, k_t: float) -> Effects:
+    return {"position_friction": {"height": v["more"] / F_d, "centre": v["centre"], "width": v["width"]}}
+
+
+def _spring(v: Values, F_d: float, k_t: float) -> Effects:
+    k = v["stiffness"]
+    return {"spring_load": {"stiffness": k}, "constant_load": {"torque": -k * v["zero"]}}
+
+
+def _unequal(v: Values, F_d: float, k_t: float) -> Effects:
+    return {"drive_unequal": {"per_ampere": v["share"] * k_t}}
+
+
+_RELATIVE: tuple[_Maker, ...] = (_load_friction, _friction_slope, _stribeck, _stretch)
+_MAKERS: Mapping[str, _Maker] = {
+    "viscous_by_direction": _as_it_is("viscous_by_direction", "difference"),
+    "pendulum": _as_it_is("pendulum", "amplitude", "phase"),
+    "output_load_friction": _as_it_is("output_load_friction", "share"),
+    "viscous_slope": _as_it_is("viscous_slope", "slope", "centre"),
+    "quadratic_drag": _as_it_is("quadratic_drag", "coefficient"),
+    "constant_load": _as_it_is("constant_load", "torque"),
+    "cogging": _as_it_is("cogging", "amplitude", "order", "phase"),
+    "load_friction": _load_friction,
+    "friction_slope": _friction_slope,
+    "stribeck": _stribeck,
+    "position_friction": _stretch,
+    "spring_load": _spring,
+    "drive_unequal": _unequal,
+}
