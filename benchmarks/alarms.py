@@ -17,10 +17,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ema.alarms import Alarms, AlarmSettings, Judged
+from ema.alarms import Alarms, AlarmSettings, Judged, Warmth
 from ema.alarms.causes import CAUSES, Kind
 from ema.alarms.condition import Condition
 from ema.alarms.settings import Persistence
+from ema.alarms.trend import ROOM
 from ema.bundle import Bundle
 from ema.core import config, resources
 from ema.core.names import FAULTS
@@ -58,7 +59,7 @@ class Raised(NamedTuple):
     level: AlarmLevel
 
 
-def raised(seen: Flown, settings: AlarmSettings) -> list[Raised]:
+def raised(flight: Flight, seen: Flown, settings: AlarmSettings) -> list[Raised]:
     """Every alarm of a flight, by the engine of the daemon."""
     n_cycles, n_lanes = seen.status.shape
     alarms = Alarms(settings, range(n_lanes))
@@ -66,6 +67,7 @@ def raised(seen: Flown, settings: AlarmSettings) -> list[Raised]:
     for cycle in range(n_cycles):
         t_ns = EPOCH_NS + round(cycle * PERIOD * 1e9)
         for lane in range(n_lanes):
+            alarms.hear(Warmth(t_ns, lane, ROOM + flight.warming * cycle / n_cycles))
             status, reasons = Status(int(seen.status[cycle, lane])), Reason(int(seen.reasons[cycle, lane]))
             judged = Judged(t_ns, lane, cycle, seen.k[cycle, lane], seen.sd[cycle, lane], status, reasons)
             found += [
@@ -149,7 +151,7 @@ def rows() -> list[dict[str, Any]]:
     for flight in healthy():
         seen = flown(flight, bundle)
         n_cycles += seen.status.size
-        table += _false(flight, seen, raised(seen, settings))
+        table += _false(flight, seen, raised(flight, seen, settings))
     table.append(_row("healthy cycles in all", n_cycles))
     return table + list(_delays(bundle, settings))
 
@@ -174,7 +176,7 @@ def _delays(bundle: Bundle, settings: AlarmSettings) -> Iterator[dict[str, Any]]
     others: Counter[str] = Counter()
     for flight in steps():
         seen = flown(flight, bundle)
-        alarms = raised(seen, settings)
+        alarms = raised(flight, seen, settings)
         for lane, (fault, points) in enumerate(flight.faults):
             size = points[-1][1]
             mine = [a for a in alarms if a.lane == lane and a.cycle >= STEP_AT]
@@ -187,7 +189,7 @@ def _delays(bundle: Bundle, settings: AlarmSettings) -> Iterator[dict[str, Any]]
                     name = f"step of {fault} to {size:g}, actuator {lane % 2}: cycles to {level.name.lower()}"
                     yield _row(name, float(came[0]) if came else np.inf, "cycles")
     for flight in growths():
-        alarms = raised(flown(flight, bundle), settings)
+        alarms = raised(flight, flown(flight, bundle), settings)
         for j, fault in enumerate(FAULTS):
             for level, setpoint in zip(
                 (AlarmLevel.WATCH, AlarmLevel.ALARM), settings.faults[fault].setpoints, strict=True

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ema.alarms import Alarms, AlarmSettings, Change, Command, Judged
-from ema.alarms.bus import ALARM, CommandListener, alarm_values
+from ema.alarms import Alarms, AlarmSettings, Change, Command, Heard, Judged
+from ema.alarms.bus import ALARM, Ears, alarm_values
 from ema.alarms.change import said
 from ema.alarms.supervision import conditions
 from ema.bus import identifiers
@@ -52,7 +52,7 @@ class AlarmDesk:
     ):
         self.alarms = Alarms(settings, actuators)
         self._codec, self._voice, self._log, self._state = codec, voice, log, state
-        self._listener = CommandListener(codec, self.alarms.actuators)
+        self._ears = Ears(codec, self.alarms.actuators)
         self._sender = Sender()
         self._n_beats = 0
         self._changed = False
@@ -69,16 +69,17 @@ class AlarmDesk:
             logger.warning("%s: %s; alarms begin anew, it is kept as %s", self._state.path, error, aside.name)
         self._log.alarm_state({"t_ns": t_ns, "snapshot": self.alarms.snapshot()})
 
-    def hear(self, frames: np.ndarray) -> list[Command]:
-        """Operators' commands among received frames, shape (n,), FRAME_DTYPE."""
-        return self._listener.hear(frames)
+    def hear(self, frames: np.ndarray) -> list[Heard]:
+        """Operators' commands and windings' temperatures among received frames, shape (n,), FRAME_DTYPE."""
+        return self._ears.hear(frames)
 
-    def command(self, command: Command) -> None:
-        """Do what an operator asks."""
-        whose = "monitor" if command.actuator is None else f"actuator {command.actuator}"
-        logger.info("%s: %s of alarm %s asked for", whose, command.action.name.lower(), command.cause)
-        self._tell(self.alarms.command(command))
-        self._save()
+    def take(self, heard: Heard) -> None:
+        """Do what an operator asks, or note a temperature."""
+        self._tell(self.alarms.hear(heard))
+        if isinstance(heard, Command):
+            whose = "monitor" if heard.actuator is None else f"actuator {heard.actuator}"
+            logger.info("%s: %s of alarm %s asked for", whose, heard.action.name.lower(), heard.cause)
+            self._save()
 
     def estimate(self, out: Identified) -> None:
         """Take an estimate; those of the identifier that runs in every cycle are judged."""

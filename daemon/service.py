@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
-from ema.alarms import Command, in_order
+from ema.alarms import Command, Heard, Warmth, in_order
 from ema.bus.codec import Codec
 from ema.bus.port import MAX_BATCH, Port
 from ema.core.errors import OccupiedError
@@ -90,7 +90,7 @@ class Service:
         self._health, self._desk, self._turn = health, desk, turn
         self._arrival, self._timeliness = Arrival(), Timeliness(watch.budget)
         self._near = _PACES * pace
-        self._later: list[Output | Verdict | Command] = []  # answers of which the rest of the work is left to do
+        self._later: list[Output | Verdict | Heard] = []  # answers of which the rest of the work is left to do
         self._later_ns = 0  # time of the first of them
         self._drops = 0
         self._asked_ns = 0  # time of the cycle that the arbiter has been asked about for longest
@@ -209,7 +209,7 @@ class Service:
             time.sleep(1e-3)
         self._stuck = not worker.idle
 
-    def _put(self, outputs: Iterable[Output | Command]) -> None:
+    def _put(self, outputs: Iterable[Output | Heard]) -> None:
         """Every estimate onto the bus as soon as it is there; the rest of the work is left for later."""
         for out in outputs:
             if not self._later:
@@ -228,8 +228,8 @@ class Service:
                     self._log_sink.event(item.event)
             elif isinstance(item, Identified):
                 self._desk.estimate(item)  # as the monitor made it, so that a replay gives the same alarms
-            elif isinstance(item, Command):
-                self._desk.command(item)
+            elif isinstance(item, Command | Warmth):
+                self._desk.take(item)
             elif isinstance(item, SampledEnvelope):
                 self._log_sink.envelope(item)
             elif isinstance(item, Event):

@@ -45,7 +45,7 @@ ROLES = {
         "`ema watch` in a third terminal shows the bus; docs/tutorials/tester.md goes on.",
     ),
     "integrator": Role(
-        ("actuator.yaml", "builder-quick.yaml", "builder.yaml", "daemon.yaml", "report.yaml"),
+        ("actuator.yaml", "builder-quick.yaml", "builder.yaml", "daemon.yaml", "alarms.yaml"),
         ("log",),
         (
             _BUILD,
@@ -55,11 +55,11 @@ ROLES = {
         "docs/tutorials/integrator.md and docs/service.md make a service of it.",
     ),
     "analyst": Role(
-        ("actuator.yaml", "builder-quick.yaml", "report.yaml"),
+        ("actuator.yaml", "builder-quick.yaml", "alarms.yaml"),
         (),
         (
             ("a flight to begin with: bundle, log, report", "ema demo --out flight"),
-            ("a report with thresholds of your own", "ema report flight/log --out flight.html --config report.yaml"),
+            ("a report with thresholds of your own", "ema report flight/log --out flight.html --alarms alarms.yaml"),
             ("the detector run again on the log", "ema replay flight/log --identify"),
         ),
         "docs/tutorials/analyst.md goes on: tables, records, what the simulation gets wrong.",

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from ema.alarms import Alarms, AlarmSettings, Change, Command, Judged
+from ema.alarms import Alarms, AlarmSettings, Change, Heard, Judged
 from ema.alarms.change import said
 from ema.alarms.supervision import conditions
 from ema.core.errors import LogError
@@ -47,10 +47,10 @@ class AlarmsAgain:
         elif message.topic == schemas.STATUS.topic and self._alarms is not None:
             yield from _told(self._alarms.supervise(message.content["t_ns"], conditions(message.content)))
 
-    def command(self, command: Command) -> Iterator[Encoded]:
-        """Take an operator's command."""
+    def hear(self, heard: Heard) -> Iterator[Encoded]:
+        """Take an operator's command, or the temperature of a winding."""
         if self._alarms is not None:
-            yield from _told(self._alarms.command(command))
+            yield from _told(self._alarms.hear(heard))
 
     def answer(self, out: Output) -> Iterator[Encoded]:
         """Take an answer of the monitor."""

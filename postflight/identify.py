@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import click
 
-from ema.alarms import AlarmSettings, Command
+from ema.alarms import AlarmSettings, Command, Warmth
 from ema.bundle import Bundle
 from ema.bundle import load as load_bundle
 from ema.bus import codec as codecs
@@ -130,8 +130,8 @@ def identified(
             yield from alarms.logged(item)
             if item.topic.startswith("/estimate/") or (item.topic == schemas.ALARM.topic and alarms.follows):
                 yield item
-        elif isinstance(item, Command):
-            yield from alarms.command(item)
+        elif isinstance(item, Command | Warmth):
+            yield from alarms.hear(item)
         else:
             outputs = (o for o in monitor.judge([item]) if not (isinstance(o, Job) and _job(o) in left_out))
             for out in answered(outputs, monitor, runner):

@@ -14,8 +14,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NamedTuple
 
-from ema.alarms import Command, in_order
-from ema.alarms.bus import CommandListener
+from ema.alarms import Command, Warmth, in_order
+from ema.alarms.bus import Ears
 from ema.bundle import Bundle
 from ema.bus import codec as codecs
 from ema.core.errors import EmaError, LogError
@@ -30,7 +30,7 @@ LONG = 30_000_000  # below this a second process takes longer to start than it s
 _TOGETHER = 16  # items sent at once
 
 Log = LogReader | ForeignLog
-Item = Job | Event | Message | Command
+Item = Job | Event | Message | Command | Warmth
 
 
 def received(
@@ -45,7 +45,7 @@ def received(
     LogError
         The frames are of several channels, and none was chosen.
     """
-    reception, listener = Reception(bundles, codecs.default(), settings), CommandListener(codecs.default(), bundles)
+    reception, listener = Reception(bundles, codecs.default(), settings), Ears(codecs.default(), bundles)
     wanted = (schemas.FRAMES.topic, "/estimate/", schemas.ALARM.topic, schemas.STATUS.topic)
     entries = log.entries(lambda topic: topic.startswith(wanted)) if isinstance(log, LogReader) else log.frames()
     only = ""

@@ -3,10 +3,11 @@
 from .alarms import Alarms, Judged
 from .causes import CAUSES, Cause, Kind
 from .change import Change
-from .command import Action, Command, in_order
+from .command import Action, Command, Heard, Warmth, in_order
 from .point import Point
 from .settings import AlarmSettings
 
 __all__ = [
-    "CAUSES", "Action", "AlarmSettings", "Alarms", "Cause", "Change", "Command", "Judged", "Kind", "Point", "in_order",
+    "CAUSES", "Action", "AlarmSettings", "Alarms", "Cause", "Change", "Command", "Heard", "Judged", "Kind", "Point",
+    "Warmth", "in_order",
 ]  # fmt: skip

@@ -17,7 +17,7 @@ from ema.core.status import AlarmLevel, AlarmState, Reason, Status
 
 from .causes import CAUSES, OF_MONITOR, Kind
 from .change import Change, Measure
-from .command import Action, Command
+from .command import Action, Command, Heard
 from .judge import Judge
 from .point import Point
 from .settings import AlarmSettings, Latching
@@ -88,6 +88,14 @@ class Alarms:
             level = self.settings.supervision.level(key[1]) if conditions.get(key) else AlarmLevel.NONE
             changes += self._judge(key, level, Measure(), t_ns)
         return changes
+
+    def hear(self, heard: Heard) -> list[Change]:
+        """Take an operator's command or the temperature of a winding."""
+        if isinstance(heard, Command):
+            return self.command(heard)
+        if heard.actuator in self._judges:
+            self._judges[heard.actuator].temp_w = heard.temp_w
+        return []
 
     def command(self, command: Command) -> list[Change]:
         """Do what an operator asks; what cannot be done changes nothing."""

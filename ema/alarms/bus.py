@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,9 @@ from ema.core.status import AlarmLevel, AlarmState
 from .alarms import urgency
 from .causes import CAUSES, OF_MONITOR
 from .change import Change, Measure
-from .command import Action, Command
+from .command import Action, Command, Heard, Warmth
 
-ALARM, COMMAND = "Alarm", "AlarmCommand"
+ALARM, COMMAND, SUPPLY = "Alarm", "AlarmCommand", "Supply"
 PERIOD = 1.0  # a standing alarm is repeated with each heartbeat [s]
 STALE = 3.0  # what was not repeated for so long is not known any more [s]
 _NONE = "none"
@@ -51,31 +51,37 @@ def command_values(action: Action, cause: str, duration: float, codec: Codec) ->
     return {"action": int(action), "cause": codec.number(COMMAND, "cause", cause), "duration": duration}
 
 
-class CommandListener:
-    """Commands in what comes from the bus or from a log; only those that pass protection and authentication."""
+class Ears:
+    """What alarms hear on a bus or in a log besides estimates; only what passes protection and authentication."""
 
     def __init__(self, codec: Codec, actuators: Iterable[int]):
-        self._codec = codec
-        self._receiver = Receiver(codec, (COMMAND,), {0, *actuators})
-        self._message = codec.messages[COMMAND]
+        numbers = {0, *actuators}
+        # one for each message: a tester's restart is not the actuator's
+        self._receivers = {name: Receiver(codec, (name,), numbers) for name in (COMMAND, SUPPLY)}
+        self._messages = {name: codec.messages[name] for name in self._receivers}
 
-    def hear(self, frames: np.ndarray) -> list[Command]:
-        """Those in a batch, in its order; shape (n,), FRAME_DTYPE."""
-        own = frames[identifiers.message_id(frames["id"]) == self._message.frame_id]
-        if not own.size:
-            return []
-        good = own[self._receiver.check(own) <= GOOD]
-        values = self._message.decode(good)
-        causes = self._message.fields["cause"].names
-        found = []
-        for row in range(good.size):
-            action, cause = int(values["action"][row]), causes.get(int(values["cause"][row]))
+    def hear(self, frames: np.ndarray) -> list[Heard]:
+        """Commands and temperatures in a batch, shape (n,), FRAME_DTYPE."""
+        ids = identifiers.message_id(frames["id"])
+        return [*self._commands(frames, ids), *self._warmth(frames, ids)]
+
+    def _good(self, name: str, frames: np.ndarray, ids: np.ndarray) -> tuple[np.ndarray, list[dict[str, Any]]]:
+        own = frames[ids == self._messages[name].frame_id]
+        if own.size:
+            own = own[self._receivers[name].check(own) <= GOOD]
+        return own, _rows(self._messages[name].decode(own)) if own.size else []
+
+    def _commands(self, frames: np.ndarray, ids: np.ndarray) -> Iterator[Command]:
+        causes = self._messages[COMMAND].fields["cause"].names
+        for frame, values in zip(*self._good(COMMAND, frames, ids), strict=True):
+            action, cause = int(values["action"]), causes.get(int(values["cause"]))
             if cause is not None and action in set(Action):
-                number = None if cause in _OWN else int(identifiers.actuator(good["id"])[row])
-                found.append(
-                    Command(int(good["t_ns"][row]), Action(action), number, cause, float(values["duration"][row]))
-                )
-        return found
+                number = None if cause in _OWN else int(identifiers.actuator(frame["id"]))
+                yield Command(int(frame["t_ns"]), Action(action), number, cause, float(values["duration"]))
+
+    def _warmth(self, frames: np.ndarray, ids: np.ndarray) -> Iterator[Warmth]:
+        for frame, values in zip(*self._good(SUPPLY, frames, ids), strict=True):
+            yield Warmth(int(frame["t_ns"]), int(identifiers.actuator(frame["id"])), float(values["temp_w"]))
 
 
 class AlarmListener:

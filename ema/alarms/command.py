@@ -1,10 +1,11 @@
-"""What an operator may do to an alarm."""
+"""What alarms hear besides estimates: what operators do to them, and how warm the windings are."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator
 from enum import IntEnum
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 
 class Action(IntEnum):
@@ -17,13 +18,24 @@ class Action(IntEnum):
 
 
 class Command(NamedTuple):
-    """One of them, for one alarm; `actuator` is None for an alarm of the monitor. `duration` is of shelving. [s]"""
+    """One action, for one alarm; `actuator` is None for an alarm of the monitor. `duration` is of shelving. [s]"""
 
     t_ns: int
     action: Action
     actuator: int | None
     cause: str
     duration: float = 0.0
+
+
+class Warmth(NamedTuple):
+    """Temperature of an actuator's winding, as it says. [°C]"""
+
+    t_ns: int
+    actuator: int
+    temp_w: float
+
+
+Heard = Command | Warmth
 
 
 class _Timed(Protocol):
@@ -34,11 +46,11 @@ class _Timed(Protocol):
 T = TypeVar("T", bound=_Timed)
 
 
-def in_order(commands: Iterable[Command], items: Iterable[T]) -> Iterator[T | Command]:
-    """Items in their order, each after the commands of its time and before: the same live and from a log."""
-    waiting: list[Any] = sorted(commands, key=lambda command: command.t_ns)
+def in_order(heard: Iterable[Heard], items: Iterable[T]) -> Iterator[T | Heard]:
+    """Items in their order, each after what was heard up to its time: the same live and from a log."""
+    waiting: deque[Heard] = deque(sorted(heard, key=lambda one: one.t_ns))
     for item in items:
         while waiting and waiting[0].t_ns <= item.t_ns:
-            yield waiting.pop(0)
+            yield waiting.popleft()
         yield item
     yield from waiting

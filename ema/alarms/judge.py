@@ -14,7 +14,7 @@ from .causes import BLIND, MODEL
 from .change import Measure
 from .condition import Condition
 from .settings import AlarmSettings
-from .trend import Trend, life
+from .trend import ROOM, Trend, life
 
 if TYPE_CHECKING:
     from .alarms import Judged
@@ -37,7 +37,8 @@ class Judge:
             },
             BLIND.name: Condition((0.5, 0.5), p, 0.0),
         }
-        self._trend = Trend(g.memory, g.least, settings.longest_gap)
+        self._trend = Trend(g.memory, g.per_kelvin, g.least, settings.longest_gap)
+        self.temp_w = ROOM  # of the winding, as last heard [°C]
         self._t_ns = 0
 
     def conditions(self, judged: Judged) -> Iterator[Condition_]:
@@ -66,7 +67,7 @@ class Judge:
 
     def _of_faults(self, judged: Judged) -> Iterator[Condition_]:
         z, g = self._settings.deviations, self._settings.growth
-        self._trend.update(judged.t_ns, judged.k, judged.sd)
+        self._trend.update(judged.t_ns, judged.k, judged.sd, self.temp_w)
         line = self._trend.line()
         for j, name in enumerate(FAULTS):
             k, sd = float(judged.k[j]), float(judged.sd[j])
@@ -91,11 +92,11 @@ class Judge:
     def snapshot(self) -> dict[str, Any]:
         """To be restored."""
         conditions = {name: condition.snapshot() for name, condition in self._conditions.items()}
-        return {"t_ns": self._t_ns, "trend": self._trend.snapshot(), "conditions": conditions}
+        return {"t_ns": self._t_ns, "temp_w": self.temp_w, "trend": self._trend.snapshot(), "conditions": conditions}
 
     def restore(self, stored: dict[str, Any]) -> None:
         """Go on from a snapshot."""
-        self._t_ns = int(stored["t_ns"])
+        self._t_ns, self.temp_w = int(stored["t_ns"]), float(stored["temp_w"])
         self._trend.restore(stored["trend"])
         for name, condition in self._conditions.items():
             condition.restore(stored["conditions"][name])

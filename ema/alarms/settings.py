@@ -46,9 +46,10 @@ class Persistence(Settings):
 
 
 class Growth(Settings):
-    """Rate of change and remaining life, from a straight line through estimates that are forgotten with time."""
+    """Rate of change and remaining life, from estimates that are forgotten with time (`ema.alarms.trend`)."""
 
     memory: float = quantity("s", "time of operation after which an estimate weighs 1/e", 1800.0, gt=0)
+    per_kelvin: float = quantity("1/K", "by which a kelvin of the winding may move k, one sd", 0.002, gt=0, le=1)
     deviations: float = quantity("", "of the rate, by which it must differ from 0 to be told", 5.0, ge=0, le=20)
     least: int = Field(default=20, ge=3, description="estimates before a rate is told")
     watch: float = quantity("1/h", "rate of k, lower end", gt=0)

@@ -1,8 +1,11 @@
 """How fast each fault grows, and when it will be at a level, in memory that does not grow.
 
-A straight line k = a + b t through all estimates, t = 0 now, each weighed by 1/sd² and forgotten by λ = exp(-Δt/τ):
+A plane k = a + b t + c θ through all estimates, t = 0 now, θ the winding's temperature less 20 °C: warm magnets look
+like shorted turns, and what follows the temperature is no wear. Each is weighed by 1/sd² and forgotten by
+λ = exp(-Δt/τ); beforehand c is 0 ± s_c:
 
-    [a b]ᵀ = P Σ λ w [1 t]ᵀ k,    P = (Σ λ w [1 t]ᵀ[1 t])⁻¹,    cov = P (Σ λ² w [1 t]ᵀ[1 t]) P · max(1, χ²/ν)
+    β = [a b c]ᵀ = P Σ λ w x k,    x = [1 t θ]ᵀ,    P = (Σ λ w x xᵀ + Λ)⁻¹,    Λ = diag(0, 0, 1/s_c²)
+    cov = P (Σ λ² w x xᵀ + Λ) P · max(1, χ²/ν)
 
 The sums are moved on to each new estimate's time. Time is that of operation: breaks are left out.
 """
@@ -14,6 +17,7 @@ import numpy as np
 from ema.core.names import FAULTS
 
 HOUR = 3600.0  # [s]
+ROOM = 20.0  # [°C]
 _N = len(FAULTS)
 _SD_LEAST = 1e-4  # an estimate at a bound may claim less
 
@@ -25,32 +29,37 @@ class Trend:
     ----------
     memory : float
         τ. [s]
+    per_kelvin : float
+        s_c: by which a kelvin may move k. [1/K]
     least : int
         Estimates before anything is told.
     longest_gap : float
         A longer silence is a break. [s]
     """
 
-    def __init__(self, memory: float, least: int, longest_gap: float):
+    def __init__(self, memory: float, per_kelvin: float, least: int, longest_gap: float):
         self._memory, self._least, self._longest_gap = memory, least, longest_gap
+        self._prior = np.diag([0.0, 0.0, per_kelvin**-2])
         self._n = 0
         self._t_ns = 0
-        self._once = np.zeros((3, _N))  # Σ λ w [1 t t²]
-        self._twice = np.zeros((3, _N))  # Σ λ² w [1 t t²]
-        self._k = np.zeros((2, _N))  # Σ λ w [k t k]
+        self._once = np.zeros((_N, 3, 3))  # Σ λ w x xᵀ
+        self._twice = np.zeros((_N, 3, 3))  # Σ λ² w x xᵀ
+        self._k = np.zeros((_N, 3))  # Σ λ w x k
         self._kk = np.zeros(_N)  # Σ λ w k²
         self._count = 0.0  # Σ λ
 
-    def update(self, t_ns: int, k: np.ndarray, sd: np.ndarray) -> None:
-        """Take one estimate; arrays of shape (6,)."""
+    def update(self, t_ns: int, k: np.ndarray, sd: np.ndarray, temp_w: float = ROOM) -> None:
+        """Take one estimate; arrays of shape (6,), temperature of the winding [°C]."""
         elapsed = (t_ns - self._t_ns) / 1e9
         if self._n and 0.0 < elapsed <= self._longest_gap:
             self._move(elapsed)
         self._t_ns = t_ns
         w = 1.0 / np.maximum(sd, _SD_LEAST) ** 2
-        self._once[0] += w
-        self._twice[0] += w
-        self._k[0] += w * k
+        x = np.array([1.0, 0.0, temp_w - ROOM])
+        seen = w[:, None, None] * np.outer(x, x)
+        self._once += seen
+        self._twice += seen
+        self._k += (w * k)[:, None] * x
         self._kk += w * k**2
         self._count += 1.0
         self._n += 1
@@ -58,26 +67,25 @@ class Trend:
     def _move(self, elapsed: float) -> None:
         """All that was seen lies so much farther back."""
         forget = np.exp(-elapsed / self._memory)
-        for sums, factor in ((self._once, forget), (self._twice, forget**2)):
-            s0, s1, s2 = sums
-            sums[:] = factor * np.array([s0, s1 - elapsed * s0, s2 - 2.0 * elapsed * s1 + elapsed**2 * s0])
-        self._k[:] = forget * np.array([self._k[0], self._k[1] - elapsed * self._k[0]])
+        back = np.array([[1.0, 0.0, 0.0], [-elapsed, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        self._once = forget * (back @ self._once @ back.T)
+        self._twice = forget**2 * (back @ self._twice @ back.T)
+        self._k = forget * (self._k @ back.T)
         self._kk *= forget
         self._count *= forget
 
     def line(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """k now, its rate and the rate's standard deviation, each of shape (6,); None before they are known."""
-        s0, s1, s2 = self._once
-        det = s0 * s2 - s1**2
-        if self._n < self._least or not (det > 1e-9 * s0 * s2).all():
+        s0, s1, s2 = self._once[:, 0, 0], self._once[:, 0, 1], self._once[:, 1, 1]
+        if self._n < self._least or not (s0 * s2 - s1**2 > 1e-9 * s0 * s2).all():
             return None
-        q0, q1, q2 = self._twice
-        a = (s2 * self._k[0] - s1 * self._k[1]) / det
-        b = (s0 * self._k[1] - s1 * self._k[0]) / det
-        chi2 = np.maximum(self._kk - a * self._k[0] - b * self._k[1], 0.0)
-        scatter = np.maximum(1.0, chi2 / max(self._count - 2.0, 1.0))
-        variance = (s1**2 * q0 - 2.0 * s0 * s1 * q1 + s0**2 * q2) / det**2
-        return a, HOUR * b, HOUR * np.sqrt(variance * scatter)
+        P = np.linalg.inv(self._once + self._prior)
+        beta = (P @ self._k[:, :, None])[:, :, 0]
+        chi2 = np.maximum(self._kk - np.sum(beta * self._k, axis=1), 0.0)
+        scatter = np.maximum(1.0, chi2 / max(self._count - 3.0, 1.0))
+        variance = (P @ (self._twice + self._prior) @ P)[:, 1, 1] * scatter
+        theta = self._once[:, 0, 2] / s0  # where the middle of what is remembered lies
+        return beta[:, 0] + beta[:, 2] * theta, HOUR * beta[:, 1], HOUR * np.sqrt(variance)
 
     def snapshot(self) -> dict[str, object]:
         """To be restored."""

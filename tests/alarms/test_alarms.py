@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from ema.alarms import Action, Alarms, AlarmSettings, Command, in_order
+from ema.alarms import Action, Alarms, AlarmSettings, Command, Warmth, in_order
 from ema.core import config
 from ema.core.errors import ConfigError
 from ema.core.status import AlarmLevel, AlarmState, Reason, Status
@@ -83,6 +83,26 @@ def test_growth_is_told_with_the_time_left(settings, judged):
     true = (level - 0.01 - per_hour * 0.5) / per_hour
     assert at_end.low < true < at_end.high
     assert at_end.high - at_end.low < 0.5 * true
+
+
+def test_what_follows_the_temperature_is_no_growth_until_the_temperature_stays(settings, judged):
+    """Magnets of a winding that warms by 40 K in 20 min look like a short of 0.05; then k4 grows by itself."""
+    rng = np.random.default_rng(8)
+
+    def flown(grows):
+        alarms, told = Alarms(settings, [0]), []
+        for n in range(3600):
+            temp_w = 20.0 + min(40.0, n / 30.0)
+            k4 = 0.00125 * (temp_w - 20.0) + grows * max(n - 1200, 0) / 3600.0 + rng.normal(0.0, 0.002)
+            alarms.hear(Warmth(T0 + n * SECOND - 1, 0, temp_w))
+            told += [c.cause for c in alarms.estimate(judged(n, k4=max(k4, 0.0))) if "_" in c.cause]
+        return set(told), alarms.standing(T0)
+
+    assert flown(0.0)[0] == set()
+    told, standing = flown(0.05)
+    assert told == {"k4_rate", "k4_life"}
+    (rate,) = (c.measure for c in standing if c.cause == "k4_rate")
+    assert rate.low < 0.05 < rate.high
 
 
 def test_a_fault_that_does_not_grow_has_no_rate(settings, judged):

@@ -17,7 +17,7 @@ from ema_postflight.alarms_again import AlarmComparison
 from ema_postflight.identify import identified, setup
 
 from ema.alarms import Action
-from ema.alarms.bus import COMMAND, AlarmListener, CommandListener, command_values
+from ema.alarms.bus import COMMAND, AlarmListener, Ears, command_values
 from ema.bus import codec as codecs
 from ema.bus.keys import Keyring
 from ema.bus.protection import Sender
@@ -171,7 +171,7 @@ def test_where_keys_are_configured_a_command_needs_its_seal(tmp_path):
         sent = fr.joined([frames, sealer.add(frames)]) if seal else frames
         sent["t_ns"] = t_ns
         decided = fr.joined([verifier.feed(sent, t_ns), verifier.feed(fr.empty(0), t_ns + 10**10)])
-        return len(CommandListener(CODEC, [0]).hear(decided))
+        return len(Ears(CODEC, [0]).hear(decided))
 
     assert heard() == 0  # who this is has to be asked first
     verifier.feed(sealer.hear(verifier.ask(t_ns), t_ns), t_ns)

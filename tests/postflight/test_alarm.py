@@ -43,7 +43,7 @@ class Monitor(threading.Thread):
                 alarms._tell(alarms.alarms.estimate(seen))
             while not self.stop.is_set():
                 for command in alarms.hear(port.read(0.05)):
-                    alarms.command(command)
+                    alarms.take(command)
                 lapses = [("silent", 1, "")]
                 status = contents.status(time.time_ns(), ServiceState.DEGRADED, 1.0, LogState.OK, 1e9, {})
                 alarms.beat(status | {"lapses": [{"reason": r, "actuator": a, "subject": s} for r, a, s in lapses]})
