@@ -10,6 +10,7 @@ import numpy as np
 
 from ema.core.errors import BusError
 from ema.core.frames import joined
+from ema.core.status import BusState
 
 from .codec import Codec
 from .identifiers import MESSAGE_MASK
@@ -48,6 +49,16 @@ class AuthenticatedPort(Port):
         self._verifier = Verifier(codec, keyring, role)
         self._told_without_key: set[object] = set()
         self._looked_ns = time.monotonic_ns()
+
+    @property
+    def bus_state(self) -> BusState:
+        """See Port."""
+        return self._port.bus_state
+
+    @property
+    def flooded(self) -> bool:
+        """See Port."""
+        return self._port.flooded
 
     @property
     def n_answers(self) -> int:

@@ -44,18 +44,25 @@ class Port(Closing):
     choice : str
         One line for people: what was opened and why.
     counters : PortCounters
-    bus_state : BusState
-    flooded : bool
-        Whether others sent more than was looked at when the port was read last.
     """
 
     def __init__(self, name: str):
         self.name = name
         self.choice = name
         self.counters = PortCounters()
-        self.bus_state = BusState.ACTIVE
-        self.flooded = False
+        self._bus_state = BusState.ACTIVE
+        self._flooded = False
         self._events: list[str] = []
+
+    @property
+    def bus_state(self) -> BusState:
+        """As the controller or the interface tells it."""
+        return self._bus_state
+
+    @property
+    def flooded(self) -> bool:
+        """Whether others send so much that it is in the way of what is wanted."""
+        return self._flooded
 
     @abstractmethod
     def read(self, timeout: float) -> np.ndarray:

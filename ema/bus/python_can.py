@@ -28,10 +28,10 @@ class PythonCanPort(Port):
     def read(self, timeout: float) -> np.ndarray:
         """See Port."""
         batch = fr.empty(MAX_BATCH)
-        count = n_errors = 0
-        while count < MAX_BATCH and n_errors < _MAX_ERRORS:
+        count = n_errors = n_error_frames = 0
+        while count + n_error_frames < MAX_BATCH and n_errors < _MAX_ERRORS:
             try:
-                message = self._bus.recv(timeout if count == n_errors == 0 else 0)
+                message = self._bus.recv(timeout if count == n_errors == n_error_frames == 0 else 0)
             except (can.CanError, OSError, ValueError) as error:
                 n_errors += 1
                 self.counters.n_unreadable += 1
@@ -40,7 +40,7 @@ class PythonCanPort(Port):
             if message is None:
                 break
             if message.is_error_frame:
-                self.counters.n_error_frames += 1
+                n_error_frames += 1
                 continue
             fill(batch[count], message)
             count += 1
@@ -48,6 +48,7 @@ class PythonCanPort(Port):
             self._failing = False
         elif n_errors == _MAX_ERRORS:
             time.sleep(min(timeout, _PAUSE))
+        self.counters.n_error_frames += n_error_frames
         self.counters.n_received += count
         return batch[:count]
 

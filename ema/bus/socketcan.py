@@ -14,6 +14,7 @@ import numpy as np
 from ema.core import frames as fr
 from ema.core.errors import BusError
 from ema.core.frames import FrameFlag
+from ema.core.status import BusState
 
 from . import mmsg
 from .port import RECEIVE_BUFFER, Filters, Port, ask_for_buffer
@@ -38,6 +39,8 @@ _ERROR_CLASSES = {
     0x080: "bus error",
     0x100: "controller restarted",
 }
+_PROBLEM, _BUS_OFF, _RESTARTED = 0x004, 0x040, 0x100
+_WARNING, _PASSIVE, _ACTIVE = 0x0C, 0x30, 0x40  # of the second byte, for reception and transmission
 
 
 class SocketCanPort(Port):
@@ -67,6 +70,7 @@ class SocketCanPort(Port):
         self._link_state = UP
         self._send_trouble = ""
         self._errors_said = 0
+        self._controller = BusState.ACTIVE
         try:
             self._socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW | socket.SOCK_NONBLOCK, socket.CAN_RAW)
         except (OSError, AttributeError) as error:
@@ -168,6 +172,9 @@ class SocketCanPort(Port):
         if not is_error.any():
             return frames
         self.counters.n_error_frames += int(np.count_nonzero(is_error))
+        for frame in frames[is_error]:
+            self._controller = _controller(int(frame["id"]), int(frame["data"][1]), self._controller)
+        self._tell_state()
         classes = int(np.bitwise_or.reduce(frames["id"][is_error]))
         if classes != self._errors_said:  # a bus in trouble sends thousands of the same
             self._errors_said = classes
@@ -198,7 +205,11 @@ class SocketCanPort(Port):
         if state != self._link_state:
             self.counters.n_link_down += self._link_state == UP
             self._link_state = state
+            self._tell_state()
             self._events.append(f"{self.name}: {state}")
+
+    def _tell_state(self) -> None:
+        self._bus_state = self._controller if self._link_state == UP else BusState.DOWN
 
     def _is_bound(self) -> bool:
         """Whether the socket is bound to the interface of this name; binds it again when that is a new one.
@@ -219,6 +230,19 @@ class SocketCanPort(Port):
         if text and text != self._send_trouble:
             self._events.append(f"{self.name}: cannot send: {text}")
         self._send_trouble = text
+
+
+def _controller(classes: int, problem: int, before: BusState) -> BusState:
+    """State of a controller after an error frame, by its classes and by its second byte."""
+    if classes & _BUS_OFF:
+        return BusState.BUS_OFF
+    if classes & _RESTARTED:
+        return BusState.ACTIVE
+    if classes & _PROBLEM and problem & _PASSIVE:
+        return BusState.ERROR_PASSIVE
+    if classes & _PROBLEM and problem & (_ACTIVE | _WARNING):
+        return BusState.ACTIVE
+    return before
 
 
 def _packed(filters: Filters | None) -> bytes:

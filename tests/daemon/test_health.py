@@ -179,17 +179,17 @@ def test_a_dead_worker_is_told_and_not_its_missing_estimates(scripted):
     ],
 )
 def test_the_state_of_the_bus(world, bus, lapse):
-    world.port.bus_state = bus
+    world.port._bus_state = bus
     assert world.go(0.25) == [(0.25, lapse.name.lower())]
     if bus is not BusState.ERROR_PASSIVE:
         assert world.go(30.0, *MESSAGES, "linear", "lf2") == []  # the bus is why
     assert world.beat() == (lapse, 255)
-    world.port.bus_state = BusState.ACTIVE
+    world.port._bus_state = BusState.ACTIVE
     assert world.go(2.0) == [(0.25, f"{lapse.name.lower()}_over")]
 
 
 def test_a_flood_is_told(world):
-    world.port.flooded = True
+    world.port._flooded = True
     assert world.go(1.0) == [(0.25, "flooded")]
     assert world.state is ServiceState.DEGRADED
 
