@@ -12,13 +12,14 @@ from ema.core.frames import FRAME_DTYPE, FrameFlag
 from . import identifiers
 from .codec import Codec
 from .e2e_state import StreamState
-from .header import N_SEQUENCES, sequence
-from .stream import GOOD, Check, Counts, Stream
+from .header import N_SEQUENCES, ahead, sequence
+from .stream import GOOD, MAX_AHEAD, Check, Counts, Stream
 
 __all__ = ["GOOD", "Check", "Counts", "Receiver", "Sender", "Stream", "StreamState"]
 
 _ROW = FRAME_DTYPE.itemsize
 _DATA = FRAME_DTYPE.fields["data"][1]  # type: ignore[index]
+_RARE = 0.05  # a stream whose frames come no more often than this can be looked at closely [s]
 _FORMAT = int(FrameFlag.EXTENDED | FrameFlag.FD)
 _REFUSED = int(FrameFlag.REFUSED)
 _FORMAT_MASK = _FORMAT | _REFUSED | int(FrameFlag.REMOTE | FrameFlag.ERROR)
@@ -72,6 +73,7 @@ class Receiver:
         self._actuators = range(identifiers.N_ACTUATORS) if actuators is None else set(actuators)
         self._n_foreign = 0
         self.streams: dict[int, Stream] = {}  # by identifier
+        self.contested: list[int] = []  # frames of the last batch that show that two send in one's name
 
     def check(self, frames: np.ndarray) -> np.ndarray:
         """Judge a batch of frames.
@@ -87,7 +89,7 @@ class Receiver:
         """
         frames = np.ascontiguousarray(frames)
         raw = frames.view(np.uint8).data
-        checks = bytearray(frames.size)
+        checks, self.contested = bytearray(frames.size), []
         streams = self.streams
         columns = (frames["id"], frames["flags"] & _FORMAT_MASK, frames["length"], sequence(frames), frames["t_ns"])
         begin = _DATA - _ROW
@@ -113,10 +115,15 @@ class Receiver:
                 stream.begin_anew_after_silence(t_ns)
                 if t_ns - self._last_heard(frame_id) > RESTART_NS:
                     self._begin_anew(self._siblings(frame_id))
-                n_restarts = stream.n_restarts
-                check = checks[n] = stream.place(number, t_ns)
+                n_restarts, expected, last_ns = stream.n_restarts, stream.expected, stream.last_ns
+                check = checks[n] = stream.place(number, t_ns, raw[begin] | raw[begin + 1] << 8)
                 if stream.n_restarts > n_restarts:
-                    self._begin_anew(other for other in self._siblings(frame_id) if other is not stream)
+                    others = [other for other in self._siblings(frame_id) if other is not stream]
+                    self._explain(stream, others, number, ahead(number, expected), t_ns, last_ns)
+                    self._begin_anew(others)
+                if stream.speakers.two:
+                    stream.speakers.two = False
+                    self.contested.append(n)
                 if check <= GOOD:
                     stream.last_ns = t_ns
         return np.frombuffer(checks, np.uint8)
@@ -140,6 +147,21 @@ class Receiver:
         return max((stream.last_ns for stream in self._siblings(frame_id)), default=0)
 
     @staticmethod
+    def _explain(stream: Stream, others: Iterable[Stream], number: int, n_ahead: int, t_ns: int, last_ns: int) -> None:
+        """Why a stream goes on elsewhere: frames were lost, its sender was restarted, or it is another one.
+
+        Losses are no more than was sent meanwhile; twice the rate is allowed, for bursts. A sender that was restarted
+        counts from 0, in all of its streams: if one of them goes on, it was not.
+        """
+        most = MAX_AHEAD + 2 * (t_ns - last_ns) / stream.period_ns
+        if 0 < n_ahead <= most:
+            return
+        if number > most:
+            stream.speakers.two = True
+        for other in others:
+            other.speakers.leave(other.expected, t_ns)
+
+    @staticmethod
     def _begin_anew(streams: Iterable[Stream]) -> None:
         """Take the next frame of each as it comes: its actuator has been restarted, or may have been.
 
@@ -156,6 +178,7 @@ class Receiver:
             return None
         if identifiers.actuator(frame_id) not in self._actuators:
             return None
-        stream = Stream(identifiers.data_id(frame_id), message.length, round(message.timeout * 1e9))
+        data_id, period_ns = identifiers.data_id(frame_id), round((message.period or _RARE) * 1e9)
+        stream = Stream(data_id, message.length, round(message.timeout * 1e9), period_ns, period_ns >= _RARE * 1e9)
         self.streams[frame_id] = stream
         return stream

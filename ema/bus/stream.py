@@ -7,6 +7,7 @@ from enum import IntEnum
 
 from .e2e_state import Result, StateMachine
 from .header import N_SEQUENCES, ahead
+from .speakers import Speakers
 
 MAX_AHEAD = 64  # frames that may be lost in a row without the stream being taken for another one
 SILENCE_NS = 50_000_000  # a sender that has restarted was silent for longer
@@ -62,6 +63,8 @@ class Stream:
     data_id: int
     length: int
     timeout_ns: int
+    period_ns: int = 1_000_000  # of its frames while they are sent, at least
+    is_rare: bool = False  # few frames a second: each is looked at closely
     machine: StateMachine = field(default_factory=StateMachine)
     counts: Counts = field(default_factory=Counts)
     expected: int = -1  # next sequence number; -1 before the first frame
@@ -73,6 +76,10 @@ class Stream:
     _left: int = -1  # what was expected before the stream followed another sequence, -1: it has not
     _followed: int = 0  # where that began
     _missing: dict[int, None] = field(default_factory=dict)  # lost sequence numbers, oldest first
+    speakers: Speakers = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.speakers = Speakers(MAX_AHEAD if self.is_rare else 0, MAX_AHEAD)
 
     def refuse(self, check: Check) -> Check:
         """Count a frame whose length or CRC is wrong, or that is not authentic: the last says nothing of the stream."""
@@ -86,9 +93,15 @@ class Stream:
         self._update(Result.ERROR)
         return check
 
-    def place(self, sequence: int, t_ns: int) -> Check:
+    def place(self, sequence: int, t_ns: int, crc: int) -> Check:
         """Judge a frame with correct CRC by its sequence number; the caller keeps `last_ns`."""
         check = self._judge(sequence, t_ns)
+        if check <= GOOD:
+            self.speakers.go_on(sequence, crc, t_ns)
+        elif check is Check.REPEATED:
+            self.speakers.repeat(sequence, crc)
+        else:
+            self.speakers.stray()
         self._update(Result.OK if check <= GOOD else Result.OTHER)
         return check
 
@@ -115,12 +128,16 @@ class Stream:
                 return Check.REORDERED
             counts.n_repeated += 1
             return Check.REPEATED
+        if self.expected < 0:
+            self.speakers.come(sequence, t_ns)
         if not 0 <= distance <= MAX_AHEAD:
+            self.speakers.come(sequence, t_ns)
             if self._returns(sequence):
                 distance = ahead(sequence, self._left)
                 self._left = -1
             elif self._has_restarted(sequence, t_ns):
                 self._left, self._followed = self.expected, sequence
+                self.speakers.leave(self.expected, t_ns)
                 self.n_restarts += 1
                 distance = 0
             else:
@@ -151,4 +168,4 @@ class Stream:
 
     def _update(self, result: Result) -> None:
         self.machine.update(result)
-        self.steady = self.machine.steady
+        self.steady = self.machine.steady and not self.is_rare

@@ -40,6 +40,7 @@ class Reason(IntFlag):
     CURRENT_SUM = 1 << 20  # the phases of a wye sum to zero, and these do not; which one is wrong is not known
     USER_POSITION = 1 << 21
     ROTOR_ANGLE = 1 << 22
+    TWO_SPEAKERS = 1 << 23  # another sender in this actuator's name: whose data these are is not known
 
     @property
     def names(self) -> list[str]:

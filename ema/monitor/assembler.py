@@ -15,6 +15,7 @@ from ema.bus.span import Span
 from ema.bus.stream import GOOD, Check
 from ema.core import frames as fr
 from ema.core.frames import FrameFlag, is_overflow
+from ema.core.status import Reason
 from ema.models.actuator import Actuator
 
 from .assembly import Assembly, Due
@@ -35,6 +36,7 @@ class _Batch(NamedTuple):
     t_ns: np.ndarray
     message: np.ndarray  # identifier of the DBC message
     actuator: np.ndarray
+    contested: np.ndarray  # whether it shows that two send in its actuator's name
 
     def part(self, begin: int, end: int) -> _Batch:
         return _Batch(*(column[begin:end] for column in self))
@@ -44,7 +46,7 @@ def _joined(batches: list[_Batch]) -> _Batch:
     if len(batches) == 1:
         return batches[0]
     if not batches:
-        return _Batch(fr.empty(0), *(np.zeros(0, kind) for kind in (np.uint8, np.int64, np.uint32, np.uint32)))
+        return _Batch(fr.empty(0), *(np.zeros(0, kind) for kind in (np.uint8, np.int64, np.uint32, np.uint32, bool)))
     frames, *columns = zip(*batches, strict=True)
     return _Batch(fr.joined(frames), *map(np.concatenate, columns))
 
@@ -66,6 +68,7 @@ class Assembler:
         self._plants = plants
         self._waiting: list[_Batch] = []
         self._n_waiting = 0
+        self._contested: set[int] = set()  # actuators in whose name two were sending
         self._chirp = codec.number("CycleStart", "motion_kind", "chirp")
         self._ids = {name: codec.messages[name].frame_id for name in RECEIVED}
         self._start, self._end, self._currents, self._motion, _ = self._ids.values()
@@ -135,6 +138,7 @@ class Assembler:
 
     def _checked(self, frames: np.ndarray) -> _Batch:
         odd = (frames["flags"] & (_TX | _ERROR)) != 0
+        data: slice | np.ndarray = slice(None)
         if not odd.any():
             checks = self.receiver.check(frames)
         else:
@@ -142,9 +146,12 @@ class Assembler:
             data = (frames["flags"] & _ERROR) == 0
             checks = np.full(frames.size, Check.FOREIGN, np.uint8)
             checks[data] = self.receiver.check(frames[data])
+        contested = np.zeros(frames.size, bool)
+        if self.receiver.contested:
+            contested[np.arange(frames.size)[data][self.receiver.contested]] = True
         ids = frames["id"]
         t_ns = frames["t_ns"].astype(np.int64)
-        return _Batch(frames, checks, t_ns, identifiers.message_id(ids), identifiers.actuator(ids))
+        return _Batch(frames, checks, t_ns, identifiers.message_id(ids), identifiers.actuator(ids), contested)
 
     def _place(self, batch: _Batch) -> Iterator[AssembledCycle | Event]:
         """Place frames; a cycle whose time runs out, or whose last frame comes, is closed at that frame."""
@@ -177,12 +184,13 @@ class Assembler:
         if not batch.frames.size:
             return
         currents = batch.message == self._currents
-        motions = (batch.message == self._motion) & (batch.checks <= GOOD)
+        motions = batch.message == self._motion
         refused = batch.checks == Check.REFUSED
         for number in self._assemblies.keys() & set(batch.actuator.tolist()):
             own, assembly = batch.actuator == number, self._assemblies[number]
-            mine = own & currents
-            assembly.place(batch.frames[mine], batch.checks[mine], batch.frames[own & motions])
+            mine, moves = own & currents, own & motions
+            assembly.place(batch.frames[mine], batch.checks[mine], batch.frames[moves], batch.checks[moves])
+            assembly.note_contested(batch.t_ns[own & batch.contested])
             assembly.note_refused(int(np.count_nonzero(own & refused)))
 
     def _mark(self, mark: _Batch) -> Iterator[AssembledCycle | Event]:
@@ -214,7 +222,20 @@ class Assembler:
                 else f"cycle {number} follows cycle {previous}: the actuator has restarted"
             )  # fmt: skip
             yield Event(cycle.t_ns, Level.WARNING, "cycles_missing", text, assembly.actuator)
+        contested = bool(cycle.reasons & Reason.TWO_SPEAKERS)
+        if contested != (assembly.actuator in self._contested):
+            self._contested ^= {assembly.actuator}
+            yield _told_of_speakers(cycle, contested)
         yield cycle
+
+
+def _told_of_speakers(cycle: AssembledCycle, two: bool) -> Event:
+    number = cycle.span.cycle
+    if two:
+        text = f"cycle {number}: two senders speak in this actuator's name; nothing is made of their frames"
+        return Event(cycle.t_ns, Level.ERROR, "two_speakers", text, cycle.actuator)
+    text = f"cycle {number}: one sender alone speaks in this actuator's name again"
+    return Event(cycle.t_ns, Level.INFO, "one_speaker", text, cycle.actuator)
 
 
 def _misfit(span: Span, plant: Actuator, chirp: int) -> str:

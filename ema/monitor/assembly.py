@@ -13,6 +13,7 @@ import numpy as np
 from ema.bus.codec import Codec
 from ema.bus.header import N_SEQUENCES
 from ema.bus.span import SAMPLES_PER_FRAME, Span
+from ema.bus.speakers import Crossings
 from ema.bus.stream import GOOD, Check
 from ema.core.names import CURRENTS
 from ema.core.status import Reason
@@ -20,6 +21,7 @@ from ema.core.status import Reason
 from .cycles import AssembledCycle, Tally
 from .track import Track
 
+CONTESTED_NS = 2_000_000_000  # a cycle that ends so soon after two senders were seen may be of either
 NEVER = np.iinfo(np.int64).max
 _NOTHING = Reason(0)
 _OF_TALLY = (
@@ -57,6 +59,8 @@ class Assembly:
         self._currents, self._motions = Track(plan.n_currents), Track(plan.n_motions)
         self._checks = np.zeros(len(Check), int)  # of PhaseCurrents since the last cycle was closed, by check
         self._n_refused = 0  # of any message, since then
+        self._crossings = Crossings(), Crossings()  # of PhaseCurrents, of Motion
+        self._contested_ns = -CONTESTED_NS  # when two senders were last seen
         self._dropped = False
         self._span: Span | None = None
         self._reasons = _NOTHING
@@ -77,14 +81,34 @@ class Assembly:
         n_left = (self._span.last_current + 1 - next_current) % N_SEQUENCES
         return n_left * SAMPLES_PER_FRAME * self._span.period
 
-    def place(self, currents: np.ndarray, checks: np.ndarray, motions: np.ndarray) -> None:
-        """Take frames of PhaseCurrents with their checks, and good ones of Motion."""
+    def place(self, currents: np.ndarray, checks: np.ndarray, motions: np.ndarray, motion_checks: np.ndarray) -> None:
+        """Take frames of PhaseCurrents and of Motion with their checks."""
         self._checks += np.bincount(checks, minlength=len(Check))
         good = currents[checks <= GOOD]
         self._currents.put(good)
-        self._motions.put(motions)
+        self._motions.put(motions[motion_checks <= GOOD])
+        self._compare(self._currents, self._crossings[0], currents, checks)
+        self._compare(self._motions, self._crossings[1], motions, motion_checks)
         if good.size:
             self._latest_ns = max(self._latest_ns, int(good["t_ns"].max()))
+
+    def _compare(self, track: Track, crossings: Crossings, frames: np.ndarray, checks: np.ndarray) -> None:
+        """Look for a sequence that goes on after frames with the same numbers and other contents."""
+        strange = checks == Check.REPEATED
+        if strange.any():
+            strange[strange] = track.contradicts(frames[strange])
+        elif not crossings.strange:
+            return
+        for t_ns, is_strange, check in zip(frames["t_ns"].tolist(), strange.tolist(), checks.tolist(), strict=True):
+            if is_strange:
+                crossings.strange = True
+            elif check <= GOOD and crossings.go_on(t_ns):
+                self._contested_ns = max(self._contested_ns, t_ns)
+
+    def note_contested(self, t_ns: np.ndarray) -> None:
+        """Frames of these times have shown that two send in this actuator's name."""
+        if t_ns.size:
+            self._contested_ns = max(self._contested_ns, int(t_ns.max()))
 
     def note_refused(self, count: int) -> None:
         """So many frames in this actuator's name were not authentic."""
@@ -176,7 +200,11 @@ class Assembly:
             missing=np.repeat(~present, SAMPLES_PER_FRAME)[: span.n_samples],
             motion=self._motion(span),
             tally=tally,
-            reasons=self._reasons | reasons | _seen(tally) | (Reason.KERNEL_DROPS if dropped else _NOTHING),
+            reasons=self._reasons
+            | reasons
+            | _seen(tally)
+            | (Reason.KERNEL_DROPS if dropped else _NOTHING)
+            | (Reason.TWO_SPEAKERS if t_ns - self._contested_ns <= CONTESTED_NS else _NOTHING),
         )
 
     def _interrupt(self, t_ns: int) -> list[AssembledCycle]:

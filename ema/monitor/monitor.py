@@ -29,6 +29,8 @@ _DEGRADING = (
     | Reason.AUTHENTICATION
 )  # fmt: skip
 
+_INVALIDATING = IMPLAUSIBLE | Reason.TWO_SPEAKERS  # and such a cycle says nothing of the model
+
 
 class _Shared(NamedTuple):
     """What the actuators of one bundle have in common; none of it changes."""
@@ -134,11 +136,11 @@ class Monitor:
 
     def _concluded(self, job: Job, estimate: Estimate) -> Iterator[Output]:
         doubt = self._channels[job.actuator].doubts[job.method]
-        changed = doubt.update(job.cycle, estimate.p_value)
+        usable = not (job.reasons | estimate.reasons) & _INVALIDATING
+        changed = usable and doubt.update(job.cycle, estimate.p_value)
         reasons = self._reasons(job, estimate)
         status = max(estimate.status, Status.DEGRADED if reasons & _DEGRADING else Status.VALID)
-        if reasons & IMPLAUSIBLE:
-            status = Status.INVALID
+        status = status if usable else max(status, Status.INVALID)
         yield Identified(job.t_ns, job.actuator, job.cycle, replace(estimate, status=status, reasons=reasons))
         if changed:
             yield _judgement(job, doubt, not self._has_last_word(job.method))

@@ -25,7 +25,7 @@ class Track:
     def __init__(self, length: int):
         capacity = 1 << (2 * length - 1).bit_length()
         self._frames = fr.empty(capacity)
-        self._positions = np.full(capacity, -1)
+        self._positions = np.full(capacity, -1)  # ~position where it has been taken
         self._last = N_SEQUENCES - 1  # position of the frame received last; its sequence number is the low 16 bits
 
     def put(self, frames: np.ndarray) -> None:
@@ -63,8 +63,16 @@ class Track:
         present = self._positions[slots] == positions
         frames = self._frames[slots]
         frames[~present] = fr.empty(1)
-        self._positions[slots[present]] = -1
+        self._positions[slots[present]] = ~positions[present]
         return frames, present
+
+    def contradicts(self, frames: np.ndarray) -> np.ndarray:
+        """Which frames have the number of one that was put here and other contents; shape of `frames`."""
+        positions = self._last - (self._last - sequence(frames).astype(np.int64)) % N_SEQUENCES
+        slots = positions % self._frames.size
+        known = (self._positions[slots] == positions) | (self._positions[slots] == ~positions)
+        other: np.ndarray = (self._frames["data"][slots] != frames["data"]).any(axis=-1)
+        return known & other
 
     def has(self, number: int) -> bool:
         """Whether the frame with this sequence number, of the newest that had it, is there."""
