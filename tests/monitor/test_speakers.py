@@ -60,7 +60,8 @@ def alone(bench, *flights):
 
 
 PHASES = {
-    "in step": 0, "one ahead": 1, "ten ahead": 10, "ten behind": -10, "hundred ahead": 100, "far": 20_000, "wrapped": -30_000,
+    "in step": 0, "one ahead": 1, "ten ahead": 10, "ten behind": -10, "hundred ahead": 100, "far": 20_000,
+    "wrapped": -30_000,
 }  # fmt: skip
 
 
