@@ -140,7 +140,7 @@ class Monitor:
         changed = usable and doubt.update(job.cycle, estimate.p_value)
         reasons = self._reasons(job, estimate)
         status = max(estimate.status, Status.DEGRADED if reasons & _DEGRADING else Status.VALID)
-        status = status if usable else max(status, Status.INVALID)
+        status = status if usable else Status.INVALID
         yield Identified(job.t_ns, job.actuator, job.cycle, replace(estimate, status=status, reasons=reasons))
         if changed:
             yield _judgement(job, doubt, not self._has_last_word(job.method))
