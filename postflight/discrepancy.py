@@ -61,6 +61,7 @@ def discrepancy(
     from ema.discrepancy.report import write_report
 
     from .integrity import tell
+    from .plans import plan_of
 
     if explain is not None and not records:
         click.echo(why(read_findings(out), explain))
@@ -71,7 +72,7 @@ def discrepancy(
     if kind not in EXAMINERS:
         raise ConfigError(f"{plant_file}: key 'kind' = {kind!r}: must be one of {', '.join(EXAMINERS)}")
     examiner = import_module(EXAMINERS[kind])
-    read, empty = _read(records, _plan(plant_file))
+    read, empty = _read(records, plan_of(plant_file))
     read = _chosen(read, cycles)
     findings_file, report, extended = (out / name for name in ("findings.json", "report.html", "extended.yaml"))
     for path in (findings_file, report, extended):
@@ -105,15 +106,6 @@ def discrepancy(
             click.echo(why(findings.as_dict(), explain))
         click.echo(f"{report}")
     tell(complaints, [], list(records))
-
-
-def _plan(plant_file: Path) -> Sidecar | None:
-    """What the plant file says of its records' columns."""
-    from ema.core import config
-    from ema.core.sidecar import Sidecar
-
-    said = config.read_yaml(plant_file).get("record")
-    return None if said is None else config.validate(said, Sidecar, f"{plant_file}, key 'record'")
 
 
 def _read(paths: Sequence[Path], plan: Sidecar | None = None) -> tuple[list[Record], list[str]]:

@@ -44,6 +44,8 @@ def read_text(path: Path, side: Sidecar) -> Table:
         raise RecordError(f"{path}: is empty")
     if len(numbered) == 1:
         raise RecordError(f"{path}: has a header and no rows")
+    if all(text.rstrip().endswith(";") for _, text in numbered[1:]) and ";" not in numbered[0][1]:
+        numbered = [(number, text.rstrip().rstrip(";")) for number, text in numbered]  # ends of statements, no fields
     texts = [text for _, text in numbered]
     dialect = _dialect(texts[: _LOOKED_AT + 1], side)
     header = [name.strip() for name in dialect.split(texts[0])]

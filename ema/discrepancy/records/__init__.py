@@ -1,0 +1,11 @@
+"""What a foreign record holds before anything is simulated: its channels, whether they agree, what it allows.
+
+`facts` looks at each channel by itself, `agreements` at pairs of them, `allowed` says which plants and findings the
+record is enough for, `begin` makes the first plant file of it.
+"""
+
+from .agreements import Agreement, agreements
+from .allowed import Allowed, allowed
+from .facts import ChannelFacts, Sampling, channels, sampling
+
+__all__ = ["Agreement", "Allowed", "ChannelFacts", "Sampling", "agreements", "allowed", "channels", "sampling"]

@@ -1,0 +1,83 @@
+"""What a record is enough for: which plant, which findings, and what in it stands in the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema.core.names import CHANNELS, CURRENTS
+from ema.core.records import Record
+
+from .agreements import Agreement
+from .facts import FALLEN, ChannelFacts, Sampling
+
+ACTUATOR = ("t", *CURRENTS, "theta_m", "theta_u", "theta_cmd")
+DRIVES = ("i_q", "torque", "force", "u_q", "w_ref")
+FEW = 500  # samples of a record from which a fit has something left to be tested with
+JITTERY = 0.2  # of a period, rms
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """Plants that the record is enough for, each with what it can identify; and what stands in the way, in words."""
+
+    plants: dict[str, str]
+    missing: dict[str, list[str]]
+    obstacles: list[str]
+
+
+def allowed(record: Record, clock: Sampling, facts: list[ChannelFacts], agree: list[Agreement]) -> Allowed:
+    """What the record allows, as far as its channels show it."""
+    have = set(record.channels)
+    plants: dict[str, str] = {}
+    missing: dict[str, list[str]] = {}
+    lacking = [_said(name) for name in ACTUATOR if name not in have]
+    if lacking:
+        missing["ema"] = lacking
+    else:
+        plants["ema"] = "faults k1…k6 and the effects of an actuator"
+    motion = have & {"theta_m", "w_m", "q", "v"}
+    drives = [name for name in DRIVES if name in have]
+    if motion and drives:
+        plants["axis"] = f"inertia, friction, loads and the effects of an axis, driven by {', '.join(drives)}"
+    else:
+        missing["axis"] = ([] if motion else ["a position or a speed: theta_m, w_m, q or v"]) + (
+            [] if drives else [f"a drive: {', '.join(DRIVES)}"]
+        )
+    disagreeing = [f"{one.what}: {one.said}" for one in agree if not one.is_fine]
+    return Allowed(plants, missing, [*_clock(clock), *_channels(facts), *disagreeing])
+
+
+def _said(name: str) -> str:
+    return f"{name} [{CHANNELS[name].unit}]"
+
+
+def _clock(clock: Sampling) -> list[str]:
+    said = []
+    if clock.n_gaps:
+        said.append(f"{clock.n_gaps} gaps, the longest {clock.longest:.3g} s at a period of {clock.period:.3g} s")
+    if clock.jitter > JITTERY:
+        said.append(f"time steps vary by {100 * clock.jitter:.0f} % of the period; they are taken as they are stamped")
+    if clock.n_samples < FEW:
+        said.append(f"{clock.n_samples} samples: too few to test a fit on a part that it has not seen")
+    return said
+
+
+def _channels(facts: list[ChannelFacts]) -> list[str]:
+    said = []
+    for one in facts:
+        if one.is_constant:
+            said.append(f"{one.name} is constant at {one.low:g} {one.unit}: it says nothing")
+        elif one.held > 0.0:
+            share = f"{100 * one.held:.1f} % of the samples"
+            said.append(f"{one.name} is held at an end of its range for {share}: clipped, or a limit")
+        if one.name in DRIVES and one.upper > FALLEN:
+            said.append(
+                f"{one.name} does not fall off before half the sampling rate ({100 * one.upper:.0f} % of its power "
+                "is in the upper part): sampled too slowly for what it does; record faster, or move more slowly"
+            )
+        if one.step and one.step > 0.02 * (one.high - one.low):
+            n = int(np.ceil((one.high - one.low) / one.step))
+            said.append(f"{one.name} has only {n} steps over its range: its noise is its quantisation")
+    return said

@@ -1,0 +1,141 @@
+"""Facts of a record's clock and of each channel by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema.core.names import CHANNELS
+from ema.core.records import Array, Record
+from ema.discrepancy.axis.noise import estimate, quantum
+
+LONG = 1.5  # a step of time longer than so many median steps is a gap
+HELD = 3  # samples in a row at a channel's end from which it is held there
+LEVELS = 5  # values from which a channel is more than a command between some levels
+ENDS = 0.002  # share of a channel's samples at its end from which that is a limit, not a peak
+HIGH = (0.6, 0.95)  # upper part of the spectrum, of half the sampling rate
+FALLEN = 0.02  # power in that part, of all but the mean, below which a channel has fallen off [1]
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """The clock of a record.
+
+    Attributes
+    ----------
+    n_cycles, n_samples : int
+        Cycles, and samples of all of them.
+    duration : float
+        Of all cycles. [s]
+    period : float
+        Median step of time. [s]
+    jitter : float
+        Standard deviation of the steps that are no gaps, of the median. [1]
+    n_gaps : int
+        Steps longer than LONG medians.
+    longest : float
+        The longest step. [s]
+    """
+
+    n_cycles: int
+    n_samples: int
+    duration: float
+    period: float
+    jitter: float
+    n_gaps: int
+    longest: float
+
+
+@dataclass(frozen=True)
+class ChannelFacts:
+    """One channel.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends of what it takes. [unit]
+    step : float
+        Of its quantisation, 0 where there is none to see. [unit]
+    noise : float
+        rms at rest, estimated from what neighbouring samples cannot agree on. [unit]
+    held : float
+        Share of its samples that lie in a row at one of its ends: clipped, or a limit. [1]
+    is_constant : bool
+    upper : float
+        Share of its power in the upper part of the spectrum, without its noise: what is sampled too slowly does not
+        fall off. [1]
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    step: float
+    noise: float
+    held: float
+    is_constant: bool
+    upper: float
+
+
+def sampling(record: Record) -> Sampling:
+    """The record's clock."""
+    steps = np.concatenate([np.diff(cycle["t"]) for cycle in record.cycles])
+    period = float(np.median(steps)) if steps.size else np.nan
+    regular = steps[steps <= LONG * period]
+    return Sampling(
+        record.n_cycles,
+        sum(cycle.n_samples for cycle in record.cycles),
+        float(sum(np.ptp(cycle["t"]) for cycle in record.cycles)),
+        period,
+        float(np.std(regular) / period) if regular.size else np.nan,
+        int(np.sum(steps > LONG * period)),
+        float(steps.max()) if steps.size else np.nan,
+    )
+
+
+def channels(record: Record) -> list[ChannelFacts]:
+    """Every channel but time."""
+    return [_channel(record, name) for name in record.channels if name != "t"]
+
+
+def _channel(record: Record, name: str) -> ChannelFacts:
+    parts = [cycle[name] for cycle in record.cycles]
+    x = np.concatenate(parts)
+    low, high = float(x.min()), float(x.max())
+    constant = low == high
+    noise = 0.0 if constant else estimate(record.cycles, name, record.resolution.get(name)).sigma
+    step = 0.0 if constant else record.resolution.get(name) or max(quantum(part) for part in parts)
+    upper = 0.0 if constant else max(_upper(part, noise) for part in parts)
+    return ChannelFacts(
+        name, CHANNELS[name].unit, low, high, float(step), float(noise), _held(parts, low, high), constant, upper
+    )
+
+
+def _held(parts: list[Array], low: float, high: float) -> float:
+    """Share of samples in runs at an end; none are a cycle's rest before or after, and the levels of a command."""
+    if low == high or len(np.unique(np.concatenate(parts))) <= LEVELS:
+        return 0.0
+    n = 0
+    for part in parts:
+        for end in (low, high):
+            at = np.concatenate([[False], part == end, [False]])
+            edges = np.flatnonzero(np.diff(at))
+            first, last = edges[::2], edges[1::2]
+            runs = (last - first)[(first > 0) & (last < len(part))]
+            n += int(runs[runs >= HELD].sum())
+    share = n / sum(len(part) for part in parts)
+    return share if share > ENDS else 0.0
+
+
+def _upper(x: Array, noise: float) -> float:
+    """Share of the power in the upper part of the spectrum, less what white noise puts there."""
+    n = len(x)
+    if n < 64:
+        return 0.0
+    window = np.hanning(n)
+    power = np.abs(np.fft.rfft((x - x.mean()) * window)) ** 2
+    top = slice(int(HIGH[0] * len(power)), int(HIGH[1] * len(power)))
+    white = noise**2 * float(np.sum(window**2))  # expected power of each line
+    total = max(float(power[1:].sum()) - white * (len(power) - 1), 1e-300)
+    return max(0.0, float(power[top].sum()) - white * len(power[top])) / total

@@ -1,0 +1,68 @@
+"""`ema plant init`: the first plant file of a bench."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ema.core.ranges import FiniteRange
+
+_POSITIVE = FiniteRange(min=0, min_open=True)
+
+
+@click.group(short_help="Plant files: begin one from records and a data sheet.")
+def plant() -> None:
+    """Make the file that says what an actuator or an axis nominally is.
+
+    \b
+    Example:
+      ema plant init bench.csv --kv 300 --out plant.yaml
+    """
+
+
+@plant.command(short_help="A commented plant file from records and a data sheet.")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="the plant file; must not exist")
+@click.option("--name", default="bench", show_default=True, help="what to call it")
+@click.option("--pole-pairs", type=click.IntRange(1, 200), help="data sheet")
+@click.option("--gear", type=_POSITIVE, metavar="N", help="turns of the motor for one of the user, N:1")
+@click.option("--R", "R", type=_POSITIVE, metavar="OHM", help="phase resistance [ohm]")
+@click.option("--L", "L", type=_POSITIVE, metavar="H", help="phase inductance [H]")
+@click.option("--kv", type=_POSITIVE, metavar="RPM/V", help="speed constant, line to line [rpm/V]")
+@click.option("--k-t", "k_t", type=_POSITIVE, metavar="N·m/A", help="torque per amplitude of current [N m/A]")
+@click.option("--J", "J", type=_POSITIVE, metavar="KG·M²", help="inertia or mass, where it is known [kg m^2, kg]")
+def init(
+    files: tuple[Path, ...], out: Path, name: str, pole_pairs: int | None, gear: float | None, **sheet: Any
+) -> None:
+    """Write a commented plant file: what you say is marked as such, what records show as fitted, the rest as a guess.
+
+    Records with phase currents of a three-phase actuator make a file of `kind: ema`, all others one of `kind: axis`.
+
+    \b
+    Examples:
+      ema plant init sine.csv rolling.csv --kv 300 --R 0.53 --pole-pairs 12 --out plant.yaml
+      ema plant init positioner.csv --out plant.yaml
+    """
+    from ema.core.errors import ConfigError
+    from ema.core.records import each_once, read_record
+    from ema.discrepancy.records import begin
+
+    from .plant_file import actuator_file, axis_file
+
+    if out.exists():
+        raise ConfigError(f"{out}: exists, and is not overwritten; choose another --out")
+    found = [read_record(path) for path in each_once(files)]
+    data = begin.Sheet(
+        pole_pairs=pole_pairs, gear=gear, R=sheet["R"], L=sheet["L"], KV=sheet["kv"], k_t=sheet["k_t"], J=sheet["J"]
+    )
+    is_actuator = all({"i_a", "i_b", "i_c", "theta_m"} <= set(record.channels) for record in found)
+    text = actuator_file(found, data, name) if is_actuator else axis_file(found, data, name)
+    try:
+        with out.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise ConfigError(f"{out}: cannot be written ({error.strerror})") from error
+    click.echo(f"made {out}; what is marked 'a guess' wants your data sheet")
+    click.echo(f"next: ema discrepancy --plant {out} {' '.join(map(str, files))} --out findings")

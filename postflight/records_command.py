@@ -1,0 +1,106 @@
+"""`ema records check`: what a foreign record holds and allows."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from ema.core.records import Record
+
+
+@click.group(short_help="Foreign records: what they hold, whether it agrees, what it allows.")
+def records() -> None:
+    """Look at records before anything is simulated.
+
+    \b
+    Example:
+      ema records check bench.csv
+    """
+
+
+@records.command(short_help="Channels, clock, agreement, and what can be identified.")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--plant", type=click.Path(path_type=Path), help="plant YAML whose key 'record' says what the columns are"
+)
+@click.option("--picture", type=click.Path(path_type=Path), help="SVG or PNG with every channel over time")
+@click.option("--json", "as_json", is_flag=True, help="Answer for a machine.")
+def check(files: tuple[Path, ...], plant: Path | None, picture: Path | None, as_json: bool) -> None:
+    """Say what each FILE has: channels, rate, jitter, gaps, clipping, steps, noise, whether channels agree, and what it
+    can and cannot identify. Exit status 1 if a file is enough for no plant.
+
+    \b
+    Examples:
+      ema records check flight.csv
+      ema records check bench.csv --picture bench.svg --json
+    """
+    from ema.core.errors import ConfigError, NegativeAnswer
+    from ema.core.records import each_once, read_record
+    from ema.discrepancy.records import agreements, allowed, channels, sampling
+
+    from .plans import plan_of
+
+    if picture is not None and picture.exists():
+        raise ConfigError(f"{picture}: exists, and is not overwritten; choose another --picture")
+    if picture is not None and picture.suffix.lower() not in (".svg", ".png", ".pdf"):
+        raise ConfigError(f"{picture}: must end in .svg, .png or .pdf")
+    plan = None if plant is None else plan_of(plant)
+    found, answers = [], []
+    for path in each_once(files):
+        record = read_record(path, plan)
+        clock, facts, agree = sampling(record), channels(record), agreements(record)
+        able = allowed(record, clock, facts, agree)
+        found.append(record)
+        answers.append((record, clock, facts, agree, able))
+    if as_json:
+        click.echo(json.dumps([_as_dict(*answer) for answer in answers], indent=2, ensure_ascii=False))
+    else:
+        for answer in answers:
+            _tell(*answer)
+    if picture is not None:
+        from .records_picture import draw
+
+        draw(found, picture)
+        click.echo(str(picture), err=as_json)
+    useless = [record.name for record, *_, able in answers if not able.plants]
+    if useless:
+        raise NegativeAnswer(f"{', '.join(useless)}: enough for no plant")
+
+
+def _as_dict(record: Record, clock: Any, facts: Any, agree: Any, able: Any) -> dict[str, Any]:
+    return {
+        "file": record.name,
+        "sampling": asdict(clock),
+        "channels": [asdict(one) for one in facts],
+        "not_understood": list(record.ignored),
+        "agreements": [asdict(one) for one in agree],
+        "plants": able.plants,
+        "missing": able.missing,
+        "obstacles": able.obstacles,
+    }
+
+
+def _tell(record: Record, clock: Any, facts: Any, agree: Any, able: Any) -> None:
+    rate = f"{1.0 / clock.period:.6g} Hz, jitter {100 * clock.jitter:.1f} % of the period"
+    click.echo(f"{record.name}: {clock.n_cycles} cycles, {clock.n_samples} samples, {clock.duration:.4g} s, {rate}")
+    click.echo(f"  {'channel':<10} {'unit':<6} {'from':>11} {'to':>11} {'step':>10} {'noise':>10}  remark")
+    for one in facts:
+        remark = "constant" if one.is_constant else f"{100 * one.held:.1f} % at an end" if one.held else ""
+        step = f"{one.step:10.3g}" if one.step else f"{'-':>10}"
+        line = f"  {one.name:<10} {one.unit:<6} {one.low:11.5g} {one.high:11.5g} {step} {one.noise:10.3g}  {remark}"
+        click.echo(line.rstrip())
+    if record.ignored:
+        click.echo(f"  not understood: {', '.join(record.ignored)}")
+    for one in agree:
+        click.echo(f"  {'ok' if one.is_fine else 'look':<5} {one.what}: {one.said}")
+    for kind, what in able.plants.items():
+        click.echo(f"  can be examined as kind: {kind}: {what}")
+    for kind, what in able.missing.items():
+        click.echo(f"  not as kind: {kind}: {', '.join(what)} missing")
+    for obstacle in able.obstacles:
+        click.echo(f"  in the way: {obstacle}")
