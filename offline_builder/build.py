@@ -14,7 +14,7 @@ from ema.core import config
 from ema.models import actuator_file
 from ema.models.actuator import Actuator
 
-from . import campaign
+from . import campaign, target
 from .analysis import analyse
 from .claim import claimed
 from .config import Builder
@@ -35,9 +35,13 @@ def build(
     pool: Executor,
     progress: Callable[[int, int], None] = lambda done, of: None,
     say: Callable[[str], None] = lambda text: None,
+    replace: bool = False,
 ) -> Bundle:
-    """Run (or resume) the campaign and write the bundle; the work folder is removed when the bundle stands."""
-    bundles.check_target(out)
+    """Run (or resume) the campaign and write the bundle; the work folder is removed when the bundle stands.
+
+    A bundle of another configuration is only replaced where `replace` says so.
+    """
+    target.check(out, builder, plant, replace)
     work = out.with_name(out.name + ".work")
     with claimed(work):
         nuisance = resolve(builder, plant)

@@ -11,12 +11,14 @@ import click
 @click.command(short_help="The offline phase: campaign, POD, schedule, A, LF2 library → bundle.")
 @click.option("--config", "config_path", required=True, type=click.Path(path_type=Path), help="builder YAML")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="folder of the bundle")
+@click.option("--force", is_flag=True, help="replace a bundle of another configuration")
 @click.option("--workers", type=click.IntRange(1, 512), default=None, help="processes (default: one for each core)")
 @click.option("--scheduler", metavar="ADDRESS", help="a Dask cluster's, instead of this machine (extra: cluster)")
-def build(config_path: Path, out: Path, workers: int | None, scheduler: str | None) -> None:
+def build(config_path: Path, out: Path, force: bool, workers: int | None, scheduler: str | None) -> None:
     """Run the HF campaign and write the bundle the daemon works with.
 
-    An interrupted build goes on where it was when called again.
+    An interrupted build goes on where it was when called again. A bundle of another configuration or plant is not
+    replaced without --force, and files that are no part of a bundle never are.
 
     \b
     Example:
@@ -43,7 +45,7 @@ def build(config_path: Path, out: Path, workers: int | None, scheduler: str | No
     with ExitStack() as stack:
         stack.callback(lambda: bar.stop() if bar.live.is_started else None)  # else it would print an empty line
         pool = stack.enter_context(executor(workers, scheduler))
-        made = phase.build(builder, plant, out, pool, progress, lambda text: console.print(f"  {text}"))
+        made = phase.build(builder, plant, out, pool, progress, lambda text: console.print(f"  {text}"), force)
     figures = made.manifest["figures"]
     click.echo(
         f"{out}: {len(made.schedule)} points ({builder.schedule.method}), λ1 share {figures['lambda_1_share']:.4f}, "

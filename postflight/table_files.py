@@ -38,6 +38,16 @@ class TableFiles(Closing):
             raise LogError(f"{path}: cannot be written ({error.strerror or error})") from error
         self.rows[path] += len(block.values[0])
 
+    def held(self) -> dict[Path, int]:
+        """Rows in each finished file, read back."""
+        return {path: file.held(path) for path, file in self._files.items()}
+
+    def check(self) -> None:
+        """LogError where a finished file does not hold all rows that were written."""
+        for path, rows in self.held().items():
+            if rows != self.rows[path]:
+                raise LogError(f"{path}: holds {rows} of {self.rows[path]} rows")
+
     def close(self) -> None:
         """Finish all files."""
         for file in self._files.values():
@@ -52,6 +62,10 @@ class _Csv:
 
     def write(self, block: Block) -> None:
         self._writer.writerows(zip(*block.values, strict=True))
+
+    def held(self, path: Path) -> int:
+        with path.open(newline="", encoding="utf-8") as file:
+            return sum(1 for _ in csv.reader(file)) - 1
 
     def close(self) -> None:
         self._file.close()
@@ -80,6 +94,11 @@ class _Parquet:
             self._arrow.array(values, type=field.type) for values, field in zip(block.values, self._schema, strict=True)
         ]
         self._writer.write_table(self._arrow.table(arrays, schema=self._schema))
+
+    def held(self, path: Path) -> int:
+        import pyarrow.parquet as pq
+
+        return int(pq.ParquetFile(path).metadata.num_rows)
 
     def close(self) -> None:
         self._writer.close()
