@@ -93,7 +93,7 @@ class Mf4Series(NumericFile):
         try:
             from asammdf import MDF, Signal
         except ImportError as error:
-            raise LogError("MF4 needs asammdf: pip install 'ema-monitor[logs]'") from error
+            raise LogError("MF4 needs asammdf: pip install 'ema-monitor[analyse]'") from error
         if out.exists():
             raise FileExistsError(None, "exists", str(out))
         self._signal = Signal
