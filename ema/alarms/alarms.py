@@ -25,7 +25,6 @@ from .settings import AlarmSettings, Latching
 HEARD_NS = 1_000_000_000  # a command is certain to be in the log before a heartbeat so much later
 VERSION = 1
 _NEVER = Latching(watch=False, alarm=False)  # only faults' own alarms latch: the others are about what is going on
-_FRESH = Point(_NEVER).snapshot()
 _Key = tuple[int | None, str]
 
 
@@ -122,7 +121,7 @@ class Alarms:
         points = [
             [number, cause, self._points[number, cause].snapshot(), list(_plain(self._measures.get((number, cause))))]
             for number, cause in self._points
-            if self._points[number, cause].snapshot() != _FRESH
+            if not self._points[number, cause].is_fresh
         ]
         return {
             "version": VERSION,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
 from ema.core.status import AlarmLevel, AlarmState
 
 from .settings import Latching
+
+_KEPT = ("condition", "level", "acknowledged", "since_cycle", "since_ns", "shelved_until_ns")
 
 
 @dataclass
@@ -58,6 +60,11 @@ class Point:
         elif condition < self.level and not self._latches and (condition > AlarmLevel.NONE or self.acknowledged):
             self._fall(condition)
 
+    @property
+    def is_fresh(self) -> bool:
+        """Whether nothing has ever happened to it."""
+        return not (self.since_ns or self.shelved_until_ns)
+
     def acknowledge(self) -> bool:
         """Somebody has seen it; False where nothing stands."""
         if self.level == AlarmLevel.NONE:
@@ -98,9 +105,7 @@ class Point:
 
     def snapshot(self) -> dict[str, int]:
         """To be restored."""
-        kept = asdict(self)
-        del kept["latching"]
-        return {name: int(value) for name, value in kept.items()}
+        return {name: int(getattr(self, name)) for name in _KEPT}
 
     def restore(self, stored: dict[str, int]) -> None:
         """Go on from a snapshot."""
