@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ema.alarms.bus import AlarmListener
+from ema.alarms.change import said
 from ema.bus import identifiers
 from ema.bus.codec import Codec
 from ema.bus.protection import GOOD, Receiver
@@ -62,6 +64,7 @@ class Live:
 
     def __post_init__(self) -> None:
         wanted = [*_ESTIMATES, "EstimateNuisance", "Heartbeat", "CycleStart", "CycleEnd"]
+        self.alarms = AlarmListener(self.codec)
         self._receiver = Receiver(self.codec, wanted)
         self._silent = False
 
@@ -74,6 +77,7 @@ class Live:
     def update(self, frames: np.ndarray) -> None:
         """Take frames in the order received, shape (n,), FRAME_DTYPE; only those that pass the protection count."""
         self.n_frames += len(frames)
+        self.events.extend((change.t_ns, said(change)) for change in self.alarms.update(frames))
         good = frames[self._receiver.check(frames) <= GOOD]
         for message, own in self.codec.split(good):
             values = message.decode(own)
@@ -90,6 +94,11 @@ class Live:
                     self._beat(t_ns, {name: int(value) for name, value in one.items()})
                 elif message.name.startswith("Cycle"):
                     self.cycles[number] = int(one["cycle"])
+
+    @property
+    def actuators(self) -> list[int]:
+        """Numbers of the actuators heard of."""
+        return sorted({number for number, _ in self.estimates} | set(self.cycles))
 
     def look(self, now_ns: int) -> None:
         """Note a heartbeat that has stopped."""

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ema_postflight.live import Live
-from ema_postflight.watch import draw
+from ema_postflight.picture import draw
+from ema_postflight.view import View
 from rich.console import Console
 
 from ema.bus import codec as codecs
@@ -40,9 +41,9 @@ def _estimate(frame, actuator, cycle, k, status=Status.VALID, reason=0, name="Es
     return frame(name, actuator, status=int(status), reason=int(reason), **values)
 
 
-def _text(state, now_ns=T0, width=200, height=50):
+def _text(state, now_ns=T0, width=200, height=50, view=None):
     console = Console(width=width, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
-    console.print(draw(state, "bus vcan0", now_ns, width, height))
+    console.print(draw(state, "bus vcan0", now_ns, width, height, view))
     console.file.close()
     return console.export_text()
 
@@ -72,6 +73,80 @@ def test_a_window_of_any_size_shows_who_when_how_and_all_six(frame, width, heigh
         assert str(1700 + number) in text
     for part in ("linear", "valid", "daemon running", "0.123", "0.234", "0.345", "0.456", "0.567", "0.678"):
         assert part in text, part
+
+
+def _alarm(frame, cause, level=2, state=1, actuator=0, t_ns=T0, value=0.2):
+    number = codecs.default().number("Alarm", "cause", cause)
+    values = {"cause": number, "level": level, "state": state, "n_standing": 1, "value": value, "low": value - 0.01}
+    return frame("Alarm", actuator, t_ns, since_cycle=7, since=np.uint64(T0), limit=0.1, **values)
+
+
+@pytest.mark.parametrize(("width", "height"), [(80, 24), (100, 30), (149, 40), (200, 50)])
+def test_labels_legend_keys_and_alarms_are_in_a_window_of_any_size(frame, width, height):
+    state = Live(codecs.default())
+    for number in range(6):
+        state.update(_estimate(frame, number, 1700 + number, [0.123, 0.2, 0, 0, 0, 0]))
+    state.update(frame("Heartbeat", state=2, uptime=5, reason=8, concerned=3))
+    for cause in ("k1", "k2", "k3", "k1_rate"):
+        state.update(_alarm(frame, cause, actuator=4))
+    state.update(_alarm(frame, "log", level=1, state=2))
+    lines = _text(state, width=width, height=height).splitlines()
+    text = "\n".join(lines)
+    assert len(lines) <= height
+    assert max(map(len, lines)) <= width
+    heading = next(line for line in lines if line.lstrip().startswith("act "))
+    assert heading.split() == ["act", "by", "cycle", "age", "status", "k1", "k2", "k3", "k4", "k5", "k6"]
+    with_mark = "0.123!!" if width < 150 else "0.123 ±0.010!!"
+    for part in ("alarms: 5, 4 not acknowledged", "!! 4.k1 alarm, active", "valid green", "! watch yellow", "+sd",
+                 "a acknowledge", "degraded (silent of actuator 3)", with_mark):  # fmt: skip
+        assert part in text, part
+    assert lines.index(next(x for x in lines if "4.k1 alarm" in x)) < lines.index(heading)
+    if height >= 30:
+        assert "monitor.log watch, acknowledged" in text
+
+
+def test_nothing_is_said_by_colour_alone(frame):
+    """Without any style the picture still tells levels and states."""
+    state = Live(codecs.default())
+    for number, status in enumerate(Status):
+        state.update(_estimate(frame, number, 1, [0.1] * 6, status))
+    state.update(_alarm(frame, "k1", level=1))
+    state.update(_alarm(frame, "k2", level=2, state=4))
+    text = _text(state, width=80, height=40)
+    for part in ("valid", "degraded", "invalid", "not estimated", "k1 watch, active", "k2 alarm, shelved"):
+        assert part in text
+
+
+def test_an_alarm_that_is_not_repeated_is_not_known_any_more(frame):
+    state = Live(codecs.default())
+    state.update(_alarm(frame, "k1"))
+    assert "0.k1 alarm" in _text(state)
+    assert "0.k1 alarm, active: k" not in _text(state, now_ns=T0 + 4 * 10**9).split("actuator 0")[0]
+
+
+def test_keys(frame):
+    state, view = Live(codecs.default()), View()
+    for number in (2, 5):
+        state.update(_estimate(frame, number, 1, [0.1] * 6))
+    state.update(_alarm(frame, "k1", actuator=5))
+    state.update(_alarm(frame, "k2", actuator=5, state=2))
+    alarms, actuators = state.alarms.known(T0), state.actuators
+    assert view.press("a", alarms, actuators).cause == "k1"
+    view.press("j", alarms, actuators)
+    assert view.press("a", alarms, actuators) is None  # acknowledged already
+    view.press("k", alarms, actuators)
+    assert view.choice(alarms).cause == "k1"
+    seen = []
+    for _ in range(4):
+        view.press("f", alarms, actuators)
+        text = _text(state, view=view)
+        seen.append((view.only, "\n2   linear" in text, "\n5   linear" in text))
+    assert seen == [("alarms", False, True), (2, True, False), (5, False, True), (None, True, True)]
+    view.press(" ", alarms, actuators)
+    assert "frozen" in _text(state, view=view)
+    view.press("q", [], [])
+    assert view.quitting
+    assert View().press("a", [], []) is None
 
 
 def test_changes_become_events(frame):
