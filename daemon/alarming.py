@@ -67,7 +67,18 @@ class AlarmDesk:
         except ValueError as error:
             aside = self._state.set_aside()
             logger.warning("%s: %s; alarms begin anew, it is kept as %s", self._state.path, error, aside.name)
-        self._log.alarm_state({"t_ns": t_ns, "snapshot": self.alarms.snapshot()})
+        self._say_state(t_ns)
+
+    def retake(self, settings: AlarmSettings, t_ns: int) -> None:
+        """Go on with other thresholds: alarms stand as they are, what led to them begins anew."""
+        alarms = Alarms(settings, self.alarms.actuators)
+        alarms.restore(self.alarms.snapshot())
+        self.alarms = alarms
+        self._say_state(t_ns)
+
+    def _say_state(self, t_ns: int) -> None:
+        settings = self.alarms.settings.model_dump(mode="json")
+        self._log.alarm_state({"t_ns": t_ns, "settings": settings, "snapshot": self.alarms.snapshot()})
 
     def hear(self, frames: np.ndarray) -> list[Heard]:
         """Operators' commands and windings' temperatures among received frames, shape (n,), FRAME_DTYPE."""

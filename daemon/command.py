@@ -55,7 +55,7 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
     started = False
     try:
         with assembled(settings) as service:
-            reloader = Reloader(settings, read, service.log)
+            reloader = Reloader(settings, read, service.log, service.desk)
             signals.decide(
                 {
                     **dict.fromkeys(signals.STOPPING, service.stop),

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
 from ema.core.errors import EmaError
 from ema.log import LogSettings, LogWriter
 
-from .settings import DaemonSettings, text
+from .alarming import AlarmDesk
+from .settings import DaemonSettings, load_alarms, text
 
-# Keys whose change touches no answer: replay uses what the log's first segment says.
-CHANGEABLE = tuple(f"log.{name}" for name in LogSettings.model_fields)
+# Keys whose change touches no estimate. Thresholds of alarms are logged where they change, and a replay follows.
+CHANGEABLE = (*(f"log.{name}" for name in LogSettings.model_fields), "alarms.file")
 
 
 class Reloader:
-    """Applies a changed configuration as far as that is possible at once.
+    """Applies a changed configuration, and changed thresholds, as far as that is possible at once.
 
     Parameters
     ----------
@@ -24,31 +26,40 @@ class Reloader:
     read : callable
         The configuration as it is now, with what the command line says instead.
     log : LogWriter
+    desk : AlarmDesk
     """
 
-    def __init__(self, settings: DaemonSettings, read: Callable[[], DaemonSettings], log: LogWriter):
-        self._settings, self._read, self._log = settings, read, log
+    def __init__(self, settings: DaemonSettings, read: Callable[[], DaemonSettings], log: LogWriter, desk: AlarmDesk):
+        self._settings, self._read, self._log, self._desk = settings, read, log, desk
 
     def reload(self) -> tuple[bool, str]:
         """Whether the configuration was taken over, and what happened in words; the log begins a new segment anyway."""
         try:
             new = self._read()
+            alarms = load_alarms(new)
         except EmaError as error:
-            self._log.cut()
-            return False, f"configuration not taken over, it goes on as before: {error}"
-        changed = dict(_differences(self._settings.model_dump(mode="json"), new.model_dump(mode="json")))
+            return self._refused(str(error))
+        changed = dict(_differences(_plain(self._settings), _plain(new)))
         fixed = sorted(key for key in changed if key not in CHANGEABLE)
         if fixed:
-            self._log.cut()
-            return False, (
-                f"configuration not taken over, it goes on as before: {', '.join(fixed)} cannot change while it runs "
-                "(restart it)"
-            )
+            return self._refused(f"{', '.join(fixed)} cannot change while it runs (restart it)")
+        thresholds = dict(_differences(_plain(self._desk.alarms.settings), _plain(alarms), "alarms.yaml"))
         self._settings = new
         log = LogSettings(**new.log.model_dump(exclude={"directory"}))
-        self._log.cut(log, {"daemon.yaml": text(new)})
-        said = ", ".join(f"{key} {before} → {now}" for key, (before, now) in sorted(changed.items()))
+        self._log.cut(log, {"daemon.yaml": text(new), "alarms.yaml": text(alarms)})
+        if thresholds:
+            self._desk.retake(alarms, time.time_ns())
+        both = sorted((changed | thresholds).items())
+        said = ", ".join(f"{key} {before} → {now}" for key, (before, now) in both)
         return True, f"configuration read again: {said or 'nothing has changed'}"
+
+    def _refused(self, why: str) -> tuple[bool, str]:
+        self._log.cut()
+        return False, f"configuration not taken over, it goes on as before: {why}"
+
+
+def _plain(settings: Any) -> Any:
+    return settings.model_dump(mode="json")
 
 
 def _differences(old: Any, new: Any, key: str = "") -> Iterator[tuple[str, tuple[Any, Any]]]:

@@ -103,6 +103,11 @@ class Service:
         """The log that is written."""
         return self._log
 
+    @property
+    def desk(self) -> AlarmDesk:
+        """Where alarms are raised."""
+        return self._desk
+
     def ask(self, what: Callable[[], None]) -> None:
         """Have the loop do something at its next turn; may be called from a signal handler."""
         self._asked.append(what)
@@ -114,6 +119,7 @@ class Service:
 
     def reload(self, reloader: Reloader) -> None:
         """Read the configuration again and say what came of it."""
+        self._work_off()  # by the thresholds that held when it came
         taken, words = reloader.reload()
         self._event(Level.INFO if taken else Level.WARNING, "reloaded" if taken else "reload_refused", words)
 

@@ -39,8 +39,10 @@ class AlarmsAgain:
     def logged(self, message: Message) -> Iterator[Encoded]:
         """Take what the daemon logged of itself: what its alarms went on from, and heartbeats."""
         if message.topic == schemas.ALARM_STATE.topic and self._settings is not None:
-            self._alarms = Alarms(self._settings, self._actuators)
             try:
+                said = message.content.get("settings")  # not in logs of earlier versions
+                settings = AlarmSettings.model_validate(said) if said else self._settings
+                self._alarms = Alarms(settings, self._actuators)
                 self._alarms.restore(message.content["snapshot"])
             except (ValueError, KeyError) as error:
                 raise LogError(f"a message on {message.topic} is not what this version writes ({error})") from error

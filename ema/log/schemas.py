@@ -199,8 +199,12 @@ ALARM = Kind(
 ALARM_STATE = Kind(
     "ema.AlarmState",
     "/alarm/state",
-    "Everything the alarms go on from, when the monitor starts; with it a replay gives the same changes.",
-    {"t_ns": _T_NS, "snapshot": {"type": "object", "description": "as in the state file (docs/alarms.md)"}},
+    "Everything the alarms go on from, when the monitor starts or takes over other thresholds; a replay follows.",
+    {
+        "t_ns": _T_NS,
+        "settings": {"type": "object", "description": "the thresholds from here on (config/alarms.yaml)"},
+        "snapshot": {"type": "object", "description": "as in the state file (docs/alarms.md)"},
+    },
 )
 
 STATUS = Kind(

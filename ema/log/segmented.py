@@ -138,6 +138,8 @@ class SegmentedLog:
         self.settings = settings or self.settings
         self._attachments |= attachments or {}
         self._cut = True
+        if self._segment is not None:
+            self._collect_frames(self._segment)  # what is written from here on comes behind them
 
     def close(self) -> None:
         """Finish the current segment. LogError when the device does not take it; the file is readable all the same."""

@@ -16,7 +16,7 @@ from ema_daemon.worker import Worker
 from ema_postflight.alarms_again import AlarmComparison
 from ema_postflight.identify import identified, setup
 
-from ema.alarms import Action
+from ema.alarms import Action, AlarmSettings
 from ema.alarms.bus import COMMAND, AlarmListener, Ears, command_values
 from ema.bus import codec as codecs
 from ema.bus.keys import Keyring
@@ -57,8 +57,10 @@ def with_command(flight, at, action, cause="k1", duration=0.0):
 def flown(coarse_bundle, scripted, tmp_path):
     """The loop on frames in batches of n; port and log folder."""
 
-    def go(frames, n=97, folder=tmp_path):
+    def go(frames, n=97, folder=tmp_path, halfway=None):
         batches = [frames[i : i + n] for i in range(0, frames.size, n)]
+        if halfway:
+            batches.insert(len(batches) // 2, lambda port: halfway(service))
         monitor = Monitor({0: coarse_bundle}, CODEC, SETTINGS)
         port = scripted(batches, lambda: service.stop())
         configured = {
@@ -148,17 +150,45 @@ def test_a_replay_gives_the_same_changes_to_the_bit(flown, flight, tmp_path, n):
     acked = with_command(flight, flight.size // 2, Action.SHELVE, duration=60.0)
     flown(with_command(acked, acked.size - 100, Action.ACK), n)
     flown(flight[:1])  # a second start, which goes on from the state file
+    counts = again(tmp_path)
+    assert counts["n_only_logged"] == counts["n_only_again"] == 0
+    assert counts["n_equal"] >= 3
+
+
+def test_thresholds_changed_while_it_runs_hold_from_there_on_and_in_a_replay(flown, flight, tmp_path):
+    high = {"faults": {f"k{j}": {"watch": 0.5, "alarm": 0.9} for j in range(1, 7)}}
+    changed = AlarmSettings.model_validate(shipped_with(THRESHOLDS | high))
+
+    class Reload:
+        def __init__(self, service):
+            self.log, self.desk = service.log, service.desk
+
+        def reload(self):
+            self.log.cut()
+            self.desk.retake(changed, int(flight["t_ns"][flight.size // 2]))
+            return True, "changed"
+
+    flown(flight, n=31, halfway=lambda service: service.ask(lambda: service.reload(Reload(service))))
+    assert ("watch", "active") in story(tmp_path)
+    assert story(tmp_path)[-1] == ("watch", "latched_cleared")  # it stands until somebody has acknowledged it
+    assert ("alarm", "active") not in story(tmp_path)
+    assert len(list(tmp_path.glob("*.mcap"))) == 2
+    counts = again(tmp_path)
+    assert counts["n_only_logged"] == counts["n_only_again"] == 0
+    assert counts["n_equal"] >= 2
+
+
+def again(folder):
+    """How many changes in a log are made again from it."""
     comparison = AlarmComparison()
-    with LogReader(tmp_path) as log:
+    with LogReader(folder) as log:
         for item in identified(log, setup(log, ()), n_processes=1):
             if getattr(item, "topic", "") == schemas.ALARM.topic:
                 if hasattr(item, "content"):
                     comparison.logged(item.content)
                 else:
                     comparison.again(json.loads(item.data))
-    counts = comparison.counts
-    assert counts["n_only_logged"] == counts["n_only_again"] == 0
-    assert counts["n_equal"] >= 3
+    return comparison.counts
 
 
 def test_where_keys_are_configured_a_command_needs_its_seal(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import threading
 import time
 
@@ -213,3 +214,20 @@ def test_late_estimates_are_marked_and_a_replay_repeats_it(run, frames, coarse_b
     sent = ran.port.sent("EstimateLinear")
     assert (sent["reason"] & Reason.LATE != 0).all()
     assert sent["age"] == pytest.approx([c["age"] for c in ran.logged("/estimate/0/linear")], abs=1e-6)
+
+
+def test_every_path_of_the_shipped_layout_is_in_a_log_as_a_number(run, frames):
+    """Foxglove shows an empty panel where a topic or field is not there, or is no number."""
+    ran = run(batches(frames))
+    layout = json.loads(resources.config("foxglove-layout.json").read_text())
+    plots = [path["value"] for panel in layout["configById"].values() for path in panel.get("paths", [])]
+    raw = [panel["topicPath"] for panel in layout["configById"].values() if "topicPath" in panel]
+    assert len(plots) > 15
+    for path in plots:
+        topic, _, names = path.partition(".")
+        value = ran.logged(topic)[0]
+        for name, index in re.findall(r"(\w+)(?:\[(\d+)\])?", names):
+            value = value[name][int(index)] if index else value[name]
+        assert isinstance(value, float | int), path
+    for topic in raw:
+        assert ran.logged(topic), topic

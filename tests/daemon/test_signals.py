@@ -6,25 +6,39 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
 from ema_daemon import signals
 from ema_daemon.reload import Reloader
-from ema_daemon.settings import load
+from ema_daemon.settings import load, load_alarms
 
+from ema.core import resources
 from ema.log import LogReader, LogSettings, LogWriter, schemas
 from ema.log.segmented import SegmentedLog
 
 EMA = Path(sys.executable).with_name("ema")
 
 
+class Desk:
+    """What a reload asks of the alarms."""
+
+    def __init__(self, settings):
+        self.alarms = SimpleNamespace(settings=settings)
+
+    def retake(self, settings, t_ns):
+        self.alarms.settings = settings
+
+
 @pytest.fixture
 def reloader(write_config, tmp_path):
-    path = write_config()
+    thresholds = tmp_path / "alarms.yaml"
+    thresholds.write_text(resources.config("alarms.yaml").read_text())
+    path = write_config(alarms={"file": "alarms.yaml"})
     settings = load(path)
     with LogWriter(settings.log.directory, {"daemon.yaml": path}, LogSettings(keep_free=0)) as log:
-        yield Reloader(settings, lambda: load(path), log), path, log
+        yield Reloader(settings, lambda: load(path), log, Desk(load_alarms(settings))), path, log
 
 
 def _change(path, **sections):
@@ -41,6 +55,18 @@ def test_what_may_change_is_taken_over(reloader):
     taken, words = one.reload()
     assert taken
     assert words == "configuration read again: log.flush_interval 1.0 → 0.5, log.keep_segments 1000 → 7"
+
+
+def test_thresholds_of_alarms_are_read_again_or_refused(reloader):
+    one, path, _ = reloader
+    thresholds = path.with_name("alarms.yaml")
+    thresholds.write_text(thresholds.read_text().replace("hysteresis: 0.2", "hysteresis: 0.3"))
+    assert one.reload() == (True, "configuration read again: alarms.yaml.hysteresis 0.2 → 0.3")
+    thresholds.write_text(thresholds.read_text().replace("hysteresis: 0.3", "hysteresis: -1"))
+    taken, words = one.reload()
+    assert not taken
+    assert "alarms.yaml: key 'hysteresis'" in words
+    assert one._desk.alarms.settings.hysteresis == 0.3
 
 
 @pytest.mark.parametrize(
