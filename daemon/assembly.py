@@ -17,6 +17,7 @@ from ema.monitor.presence import Presence
 
 from .alarming import AlarmDesk
 from .health import Health
+from .identity import ATTACHMENT, Identity
 from .remote import RemoteRunner
 from .service import Service
 from .settings import DaemonSettings, load_alarms, load_bundles, text
@@ -38,6 +39,8 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     """
     codec = default()
     bundles = load_bundles(settings)
+    configuration = text(settings)
+    identity = Identity.of(bundles, configuration)
     alarm_settings = load_alarms(settings)
     monitor = Monitor(bundles, codec, settings.monitor)
     local = Runner(bundles, [method for method in settings.monitor.slower if method not in settings.remote]).run
@@ -49,7 +52,8 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     }
     attachments: dict[str, bytes | Path] = {
         codec.path.name: codec.path,
-        "daemon.yaml": text(settings),
+        "daemon.yaml": configuration,
+        ATTACHMENT: identity.as_json(),
         "alarms.yaml": text(alarm_settings),
         **_manifests(bundles),
     }
@@ -75,7 +79,7 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
         supervisor = promised(bundles, every, remote, watch)
         answering = {method: runner.answers for method, runner in remote.items()}
         health = Health(monitor, port, log, supervisor, answering)
-        yield Service(monitor, port, log, codec, workers, settings.pace, health, watch, desk, turn)
+        yield Service(monitor, port, log, codec, workers, settings.pace, health, watch, desk, turn, identity)
 
 
 def _heard(codec: Codec) -> list[tuple[int, int]]:

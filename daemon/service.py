@@ -33,6 +33,7 @@ from ema.monitor import (
 from .alarming import AlarmDesk
 from .arrival import Arrival
 from .health import Health
+from .identity import Identity
 from .memory import settle
 from .notify import notify
 from .reload import Reloader
@@ -43,6 +44,7 @@ from .voice import Voice
 from .worker import Worker
 
 BEAT = 1.0  # [s]
+IDENTIFY = 10.0  # between two times that the software, the bundles and the configuration are told [s]
 _WAIT = 0.05  # longest wait for frames, so that answers of workers and signals are seen [s]
 _CYCLES_APART_NS = 250_000_000  # cycles of one actuator end farther apart
 _LOOK_WAITS = 0.1  # at most so long, for a cycle's end [s]
@@ -69,6 +71,8 @@ class Service:
     watch : SupervisionSettings
     desk : AlarmDesk
     turn : Turn
+    identity : Identity, optional
+        What is told of the software, the bundles and the configuration; nothing without.
     """
 
     def __init__(
@@ -83,6 +87,7 @@ class Service:
         watch: SupervisionSettings,
         desk: AlarmDesk,
         turn: Turn,
+        identity: Identity | None = None,
     ):
         self._monitor, self._port, self._log = monitor, port, log
         self._bus_sink, self._log_sink = BusSink(Voice(port, turn), codec), LogSink(log)
@@ -96,6 +101,7 @@ class Service:
         self._asked_ns = 0  # time of the cycle that the arbiter has been asked about for longest
         self._stuck = False
         self._stopping = False
+        self._identity, self._identified = identity, -np.inf
         self._asked: deque[Callable[[], None]] = deque()
 
     @property
@@ -288,6 +294,9 @@ class Service:
         notify("WATCHDOG=1")
 
     def _send_beat(self, uptime: float, now_ns: int) -> None:
+        if self._identity is not None and uptime - self._identified >= IDENTIFY:
+            self._identified = uptime
+            self._bus_sink.identification(self._identity, now_ns)
         health = self._health
         self._bus_sink.heartbeat(health.heartbeat(uptime), health.supervision(), now_ns)
         lapses = health.supervisor.ordered

@@ -17,6 +17,7 @@ from ema.bus.interface import BusSettings
 from ema.core import config, resources
 from ema.core.config import Settings
 from ema.core.errors import BundleError
+from ema.core.signatures import load_trusted
 from ema.core.units import quantity
 from ema.identification import METHODS
 from ema.log import LogSettings
@@ -58,6 +59,9 @@ class DaemonSettings(Settings):
     log: LogSection
     monitor: MonitorSettings = MonitorSettings()
     alarms: AlarmSection = AlarmSection()
+    trusted_keys: list[str] = Field(
+        default_factory=list, description="public Ed25519 keys (PEM): only bundles signed with one of them are taken"
+    )
     remote: dict[str, str] = Field(
         default_factory=dict, description="identifiers in a process of their own (`ema hf-worker`): its Unix socket"
     )
@@ -116,8 +120,16 @@ def load(path: Path) -> DaemonSettings:
     bus = settings.bus.model_copy(
         update={"key_file": key_file and folder / key_file, "session_file": session_file and folder / session_file}
     )
+    trusted = [str(folder / path) for path in settings.trusted_keys]
     return settings.model_copy(
-        update={"bus": bus, "actuators": actuators, "log": log, "alarms": alarms, "remote": remote}
+        update={
+            "trusted_keys": trusted,
+            "bus": bus,
+            "actuators": actuators,
+            "log": log,
+            "alarms": alarms,
+            "remote": remote,
+        }
     )
 
 
@@ -128,12 +140,13 @@ def load_alarms(settings: DaemonSettings) -> AlarmSettings:
 
 def load_bundles(settings: DaemonSettings) -> dict[int, Bundle]:
     """The bundle of each actuator, one object for those of the same contents; BundleError where made for another."""
+    trusted = [load_trusted(Path(path)) for path in settings.trusted_keys]
     loaded: dict[str, Bundle] = {}
     distinct: list[Bundle] = []
     bundles = {}
     for number, one in settings.actuators.items():
         if one.bundle not in loaded:
-            bundle = load_bundle(one.bundle)
+            bundle = load_bundle(one.bundle, trusted)
             alike = [other for other in distinct if other.manifest == bundle.manifest]  # hashes of the arrays included
             distinct += [] if alike else [bundle]
             loaded[one.bundle] = (*alike, bundle)[0]

@@ -16,6 +16,7 @@ from ema.log import LogWriter, contents
 from ema.monitor import Event, Identified, Level, SampledEnvelope
 from ema.monitor.supervision import Promise
 
+from .identity import Identity
 from .voice import Voice
 
 logger = logging.getLogger("ema.daemon")
@@ -68,6 +69,11 @@ class BusSink:
                 **{"value": beside.value[known], "sd": beside.sd[known], "low": low, "high": high},
             }
             self._send("EstimateNuisance", out.actuator, values, out.t_ns)
+
+    def identification(self, identity: Identity, t_ns: int) -> None:
+        """What makes the estimates, one frame for each actuator."""
+        for actuator in identity.bundles:
+            self._send("Identification", actuator, identity.signals(actuator), t_ns)
 
     def heartbeat(self, values: dict[str, Any], supervision: dict[str, Any], t_ns: int) -> None:
         """The sign of life, and beside it everything that does not happen."""

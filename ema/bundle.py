@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from pydantic import ConfigDict
 
 from ema.core.config import Settings, digest, validate
 from ema.core.errors import BundleError, ConfigError
 from ema.core.names import FAULTS
+from ema.core.signatures import TrustedKey, sign, signer
 from ema.core.version import version
 from ema.faults import N_FAULTS
 from ema.identification.known_error import KnownError, n_terms
@@ -28,6 +32,7 @@ from ema.models.lf2 import Lf2
 
 FORMAT = "ema-bundle"
 VERSION = 7
+SIGNATURE = "manifest.sig"
 _LF2 = tuple(field.name for field in fields(Lf2) if field.name != "i0")
 SHAPES = {
     "i0": ("n_t",), "v1": ("n_t",), "eigenvalue_share": ("r",), "schedule": ("n_omega",), "A": ("n_omega", 6),
@@ -76,6 +81,12 @@ class Bundle:
     path: Path
     manifest: dict[str, Any]
     arrays: dict[str, np.ndarray]
+    signed_by: str = ""  # fingerprint of the trusted key it is signed with, where that was asked for
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the whole bundle: of the manifest's content, which holds those of the arrays."""
+        return hashlib.sha256(json.dumps(self.manifest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
     @cached_property
     def plant(self) -> Actuator:
@@ -165,8 +176,18 @@ def check_target(path: Path) -> None:
         raise BundleError(f"{path}: cannot be looked into ({error.strerror})") from error
 
 
-def save(path: Path, plant: Actuator, builder: dict[str, Any], arrays: dict[str, np.ndarray], **facts: Any) -> Bundle:
-    """Write a bundle whole and fit to be loaded, or not at all; refuses to replace anything that is not a bundle."""
+def save(
+    path: Path,
+    plant: Actuator,
+    builder: dict[str, Any],
+    arrays: dict[str, np.ndarray],
+    key: Ed25519PrivateKey | None = None,
+    **facts: Any,
+) -> Bundle:
+    """Write a bundle whole and fit to be loaded, or not at all; refuses to replace anything that is not a bundle.
+
+    With a `key` the manifest is signed, and with it, through their hashes, the arrays.
+    """
     path = Path(path)
     check_target(path)
     home = path.resolve()
@@ -187,9 +208,10 @@ def save(path: Path, plant: Actuator, builder: dict[str, Any], arrays: dict[str,
             "plant": plant.model_dump(mode="json"), "plant_hash": digest(plant),
             "builder": builder, **facts, "arrays": entries,
         }  # fmt: skip
-        (scratch / "manifest.json").write_text(
-            json.dumps(manifest, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
-        )
+        text = json.dumps(manifest, indent=1, ensure_ascii=False) + "\n"
+        (scratch / "manifest.json").write_text(text, encoding="utf-8")
+        if key is not None:
+            (scratch / SIGNATURE).write_text(sign(text.encode(), key), encoding="ascii")
         load(scratch)
         _put(scratch, home)
     except OSError as error:
@@ -210,12 +232,17 @@ def _put(new: Path, home: Path) -> None:
     shutil.rmtree(aside, ignore_errors=True)
 
 
-def load(path: str | Path) -> Bundle:
-    """Read a bundle and check it: format, version, order of k, hashes, shapes, finite numbers."""
+def load(path: str | Path, trusted: Sequence[TrustedKey] = ()) -> Bundle:
+    """Read a bundle and check it: format, version, order of k, hashes, shapes, finite numbers.
+
+    With `trusted` keys its manifest must be signed by one of them, and that comes before anything it says.
+    """
     path = Path(path)
     manifest_path = path / "manifest.json"
     try:
-        manifest = json.loads(manifest_path.read_text(encoding="utf-8"))
+        content = manifest_path.read_bytes()
+        signed_by = _signer(path, content, trusted) if trusted else ""
+        manifest = json.loads(content.decode())
     except FileNotFoundError as error:
         raise BundleError(f"{path}: is not a bundle (no manifest.json); make one with 'ema build'") from error
     except NotADirectoryError as error:
@@ -234,7 +261,8 @@ def load(path: str | Path) -> Bundle:
         raise BundleError(f"{manifest_path}: order of k is not {', '.join(FAULTS)}")
     try:
         entries = validate(manifest, _Manifest, manifest_path).arrays
-        bundle = Bundle(path, manifest, {name: _array(path, name, entry.sha256) for name, entry in entries.items()})
+        arrays = {name: _array(path, name, entry.sha256) for name, entry in entries.items()}
+        bundle = Bundle(path, manifest, arrays, signed_by)
         _check(bundle)
     except ConfigError as error:
         raise BundleError(str(error)) from error
@@ -246,12 +274,28 @@ def _array(path: Path, name: str, sha256: str) -> np.ndarray:
     if Path(name).name != name:
         raise BundleError(f"{path / 'manifest.json'}: array entry '{name[:40]}' is damaged")
     try:
-        if _sha256(file) != sha256:
+        content = file.read_bytes()  # once, so that what is used is what was checked
+        if hashlib.sha256(content).hexdigest() != sha256:
             raise BundleError(f"{file}: is damaged (SHA-256 differs from the manifest's)")
-        array: np.ndarray = np.load(file, allow_pickle=False)
+        array: np.ndarray = np.load(io.BytesIO(content), allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
         raise BundleError(f"{file}: cannot be read ({error})") from error
     return array
+
+
+def _signer(path: Path, content: bytes, trusted: Sequence[TrustedKey]) -> str:
+    """Fingerprint of the key the manifest is signed with; BundleError where that is none of the trusted ones."""
+    try:
+        signature = (path / SIGNATURE).read_text(encoding="ascii")
+    except FileNotFoundError as error:
+        raise BundleError(f"{path}: is not signed, and the configuration trusts signed bundles only") from error
+    except UnicodeDecodeError as error:
+        raise BundleError(f"{path / SIGNATURE}: is damaged") from error
+    found = signer(content, signature, trusted)
+    if found is None:
+        keys = ", ".join(str(key.path) for key in trusted)
+        raise BundleError(f"{path}: its manifest is not the one that was signed, or by no trusted key ({keys})")
+    return found.fingerprint
 
 
 def _carried(bundle: Bundle) -> Nuisance:

@@ -8,6 +8,8 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
 from ema import bundle as bundles
 from ema.bundle import Bundle
 from ema.core import config
@@ -36,10 +38,11 @@ def build(
     progress: Callable[[int, int], None] = lambda done, of: None,
     say: Callable[[str], None] = lambda text: None,
     replace: bool = False,
+    key: Ed25519PrivateKey | None = None,
 ) -> Bundle:
     """Run (or resume) the campaign and write the bundle; the work folder is removed when the bundle stands.
 
-    A bundle of another configuration is only replaced where `replace` says so.
+    A bundle of another configuration is only replaced where `replace` says so. With a `key` the bundle is signed.
     """
     target.check(out, builder, plant, replace)
     work = out.with_name(out.name + ".work")
@@ -51,6 +54,6 @@ def build(
         facts: dict[str, Any] = {"builder_hash": config.digest(builder), "figures": figures}
         if len(nuisance):
             facts["nuisance"] = nuisance.as_list()
-        made = bundles.save(out, plant, builder.model_dump(mode="json"), arrays, **facts)
+        made = bundles.save(out, plant, builder.model_dump(mode="json"), arrays, key, **facts)
         shutil.rmtree(work)
     return made

@@ -14,7 +14,10 @@ import click
 @click.option("--force", is_flag=True, help="replace a bundle of another configuration")
 @click.option("--workers", type=click.IntRange(1, 512), default=None, help="processes (default: one for each core)")
 @click.option("--scheduler", metavar="ADDRESS", help="a Dask cluster's, instead of this machine (extra: cluster)")
-def build(config_path: Path, out: Path, force: bool, workers: int | None, scheduler: str | None) -> None:
+@click.option("--sign", "key_path", type=click.Path(path_type=Path), help="private Ed25519 key (PEM) to sign it with")
+def build(
+    config_path: Path, out: Path, force: bool, workers: int | None, scheduler: str | None, key_path: Path | None
+) -> None:
     """Run the HF campaign and write the bundle the daemon works with.
 
     An interrupted build goes on where it was when called again. A bundle of another configuration or plant is not
@@ -24,13 +27,17 @@ def build(config_path: Path, out: Path, force: bool, workers: int | None, schedu
     Example:
       ema build --config config/builder-quick.yaml --out bundle
       ema build --config config/builder.yaml --out bundle --scheduler tcp://10.0.0.1:8786
+      ema build --config config/builder.yaml --out bundle --sign builder.pem
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+    from ema.core.signatures import load_private
+
     from . import build as phase
     from .executors import executor
 
+    key = None if key_path is None else load_private(key_path)
     builder, plant = phase.read(config_path)
     console = Console(stderr=True)
     bar = Progress(
@@ -45,7 +52,7 @@ def build(config_path: Path, out: Path, force: bool, workers: int | None, schedu
     with ExitStack() as stack:
         stack.callback(lambda: bar.stop() if bar.live.is_started else None)  # else it would print an empty line
         pool = stack.enter_context(executor(workers, scheduler))
-        made = phase.build(builder, plant, out, pool, progress, lambda text: console.print(f"  {text}"), force)
+        made = phase.build(builder, plant, out, pool, progress, lambda text: console.print(f"  {text}"), force, key)
     figures = made.manifest["figures"]
     click.echo(
         f"{out}: {len(made.schedule)} points ({builder.schedule.method}), λ1 share {figures['lambda_1_share']:.4f}, "

@@ -32,7 +32,7 @@ def check(out: Path, builder: Builder, plant: Actuator, replace: bool = False) -
     except (OSError, ValueError):
         manifest = None
     listed = manifest.get("arrays") if isinstance(manifest, dict) else None
-    own = {"manifest.json", "manifest.sig", *(f"{name}.npy" for name in listed or {})}
+    own = {"manifest.json", bundles.SIGNATURE, *(f"{name}.npy" for name in listed or {})}
     foreign = sorted(path.name for path in out.iterdir() if path.name not in own and (listed or path.suffix != ".npy"))
     if foreign:
         more = f" and {len(foreign) - 3} more" if len(foreign) > 3 else ""
