@@ -6,7 +6,10 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test test-vcan test-systemd soak wheel deb install uninstall check env bench bench-discrepancy lock clean
+# What the service runs on and nothing else, as a bill of materials (CycloneDX): from the lock it is installed by.
+SBOM := $(BIN)/cyclonedx-py requirements requirements-run.lock --pyproject pyproject.toml --output-reproducible
+
+.PHONY: demo test test-vcan test-systemd test-adversary coverage soak wheel deb install uninstall check env bench bench-discrepancy lock clean
 
 demo: env
 	$(BIN)/ema demo --out out/demo
@@ -23,6 +26,17 @@ test-vcan: env
 # The service on a machine with a real systemd, in User-Mode Linux (needs tools/install_system_packages).
 test-systemd: env
 	$(BIN)/pytest -m systemd tests/systemd/test_machine.py
+
+# Attacks on a daemon process, four minutes; `make test-adversary LONG=--long` attacks more often. Writes the page's table.
+LONG ?=
+test-adversary: env
+	$(BIN)/pytest -n 2 -m adversary tests/adversary $(LONG) --reliability docs/reliability.md
+
+# Branch coverage of the monitor by the quick part of its tests: printed, no number is chased.
+coverage: env
+	$(BIN)/coverage run --branch --source ema.bus,ema.core,ema.log,ema.monitor,ema_daemon -m pytest -m "not adversary and not slow" \
+	  tests/core tests/bus tests/monitor tests/log/test_round_trip.py tests/daemon/test_health.py tests/daemon/test_service.py
+	$(BIN)/coverage report --skip-covered --sort cover
 
 # A day's cycles through one daemon as fast as this machine takes them, then SIGKILL many times; needs a bundle.
 SOAK_CYCLES  ?= 86400
@@ -60,6 +74,7 @@ $(STAMP): requirements.lock pyproject.toml
 wheel: env
 	rm -rf build dist
 	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+	$(SBOM) --output-file dist/ema-monitor.cdx.json
 	rm -rf build *.egg-info  # found first by a Python that runs in this folder
 
 # HF=--hf: with the HF worker beside the monitor, and the compiler it needs.

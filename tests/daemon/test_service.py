@@ -48,15 +48,15 @@ class Ran:
 def run(coarse_bundle, tmp_path, scripted):
     """Runs the service on batches of frames until they end."""
 
-    def go(batches, run_job=None, queue=8, watch=WATCH):
-        bundles = {0: coarse_bundle}
+    def go(batches, run_job=None, queue=8, watch=WATCH, numbers=(0,), pace=0.0):
+        bundles = dict.fromkeys(numbers, coarse_bundle)
         monitor = Monitor(bundles, CODEC, SETTINGS)
         worker = Worker(run_job or Runner(bundles).run, queue, "lf2")
         port = scripted(batches, lambda: service.stop())
         turn = Turn(Presence(CODEC, monitor.actuators), port.name, 0.0, False)
         with LogWriter(tmp_path) as log, desk(bundles, port, log, tmp_path) as alarms:
-            health = Health(monitor, port, log, promised([0], {"lf2": 2.0}, [], WATCH))
-            service = Service(monitor, port, log, CODEC, {"lf2": worker}, 0.0, health, watch, alarms, turn)
+            health = Health(monitor, port, log, promised(numbers, {"lf2": 2.0}, [], WATCH))
+            service = Service(monitor, port, log, CODEC, {"lf2": worker}, pace, health, watch, alarms, turn)
             service.run()
         with LogReader(tmp_path) as reader:
             return Ran(port, reader)
@@ -106,6 +106,28 @@ def test_everything_received_is_logged_and_the_log_is_finished(run, frames):
     assert [c["cycle"] for c in ran.logged("/envelope/0")] == list(range(6))
     codes = [c["code"] for c in ran.logged("/event")]
     assert codes == ["started", "stopped"]
+
+
+def test_near_a_cycles_end_all_that_can_wait_does(run, fly):
+    """Two cycles end frame by frame in one millisecond: both are answered before a job of the first is handed on."""
+    frames = fly(n_cycles=1, seed=5, actuators=[{"number": 0}, {"number": 1}])[0][1]
+    ends = np.flatnonzero((frames["id"] & ~np.uint32(63 << 2)) == CODEC.messages["CycleEnd"].frame_id)
+    first, last = ends[0] - 5, ends[-1] + 1
+    parts = [*batches(frames[:first]), *batches(frames[first:last], 1), frames[last:]]
+    answered = []
+
+    def job(job):
+        answered.append([port_of.sent("EstimateLinear")["cycle"].size, job.actuator])
+        raise RuntimeError("not looked at")
+
+    port_of = None
+
+    def remember(port):
+        nonlocal port_of
+        port_of = port
+
+    run([remember, *parts], run_job=job, numbers=(0, 1), pace=3e-3)
+    assert answered == [[2, 0], [2, 1]]
 
 
 def test_the_heartbeat_counts(run, frames):

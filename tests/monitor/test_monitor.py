@@ -126,6 +126,20 @@ def test_damage_that_leaves_the_data_whole_changes_no_estimate(bench, fly, growi
         assert b.estimate.reasons & Reason.CORRUPT_FRAMES
 
 
+def test_the_end_of_a_cycle_is_foreseen_by_the_currents_it_lacks(bench, fly, growing):
+    frames = fly(**growing)[0][1]
+    monitor, currents = bench.monitor(), bench.places(frames, "PhaseCurrents")
+    (end,) = bench.places(frames, "CycleEnd")
+    soon = {}
+    for begin in range(0, frames.size, 7):
+        monitor.update(frames[begin : begin + 7])
+        n_left = np.count_nonzero(currents >= begin + 7) if begin + 7 <= end else None
+        soon.setdefault(n_left, []).append(monitor.ends_within(9.5e-3))
+    assert not any(soon.pop(None))  # it has ended
+    for n_left, foreseen in soon.items():
+        assert foreseen == [n_left <= 9] * len(foreseen)  # a millisecond each
+
+
 def test_actuators_on_one_bus_do_not_influence_each_other(bench, fly):
     flight = fly(n_cycles=2, actuators=[{"number": n} for n in (3, 7, 63)])
     together = {(a.actuator, a.cycle): a.estimate.k for a in bench.linear(flight, 3, 7, 63)}
