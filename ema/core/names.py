@@ -45,4 +45,9 @@ CHANNELS = {
     "q": Channel("m", "position of a linear axis"),
     "v": Channel("m/s", "speed of a linear axis"),
     "force": Channel("N", "force on a linear axis"),
+    "torque": Channel("N m", "torque on a rotary axis"),
+    "theta_ref": Channel("rad", "commanded angle of an axis"),
+    "q_ref": Channel("m", "commanded position of a linear axis"),
+    "duty": Channel("1", "duty cycle of the drive, -1 to 1 of its supply"),
+    "enabled": Channel("1", "1 where the drive acts, 0 where it is off"),
 }

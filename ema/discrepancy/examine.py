@@ -315,10 +315,10 @@ def _effects(plant: Plant, state: _State, trust: dict[str, float], point: Any, d
 
 def _leans(fitted: Fit, candidate: Candidate) -> bool:
     """Whether a law leans on its bounds: then it is not the one that is missing."""
-    return any(_at_bound(f, fitted.point[f.name]) for f in candidate.free if not f.is_shape)
+    return any(at_bound(f, fitted.point[f.name]) for f in candidate.free if not f.is_shape)
 
 
-def _at_bound(free: Free, value: float) -> bool:
+def at_bound(free: Free, value: float) -> bool:
     """Whether a fitted value leans on its bound, other than the one that switches the effect off."""
     near = 1e-3 * (free.high - free.low)
     return value > free.high - near or (value < free.low + near and free.low != 0.0)

@@ -33,12 +33,35 @@ class SpeedLoop(Settings):
     I_max: float = quantity("A", "limit of the current", 1e6, gt=0)
 
 
+class PositionLoop(Settings):
+    """A drive's position loop:  y = sat(K_p (θ_ref - θ) + K_d (k_v ω_ref - ω) + F_c sign ω_ref, ±limit).
+
+    A cascade of position and speed loops is one with K_d = K_w and K_p = K_w times the gain of its position loop.
+    """
+
+    gives: Literal["current", "voltage", "torque", "force", "duty"] = "current"
+    K_p: float = Field(ge=0, le=1e9, allow_inf_nan=False, description="y per position error")
+    K_d: float = Field(default=0.0, ge=0, le=1e9, allow_inf_nan=False, description="y per speed error")
+    k_v: float = Field(default=1.0, ge=0, le=10, description="share of the commanded speed that is fed forward")
+    F_c: float = Field(default=0.0, ge=0, le=1e9, description="friction compensation of the firmware, in units of y")
+    limit: float = Field(default=1e9, gt=0, le=1e9, description="largest y")
+
+
 class Axis(Settings):
     """What rotary and linear axes share. `fitted` names parameters whose plant-file values are only a start."""
 
     kind: Literal["axis"] = "axis"
     name: str = Field(default="axis", min_length=1, max_length=80)
-    drive: Literal["current", "voltage", "force", "speed-loop"] = "current"
+    drive: Literal["current", "voltage", "force", "torque", "speed-loop"] = "current"
+    torque_at: Literal["motor", "load"] = Field(
+        default="motor", description="side of the gear on which a driving torque was measured"
+    )
+    gear: float = Field(default=1.0, gt=0, le=1e5, description="turns of the motor per turn of the load")
+    measured_at: Literal["motor", "load"] = Field(
+        default="motor",
+        description="side of the gear whose position, speed and inertia the plant file and records have",
+    )
+    position_loop: PositionLoop | None = None
     R: float | None = quantity("ohm", "resistance seen by the drive voltage", None, ge=0, le=1e4)
     L: float | None = quantity("H", "inductance seen by the drive voltage", None, ge=0, le=10)
     V_dc: float | None = quantity("V", "supply without load, for which u_q is commanded", None, gt=0, le=1e5)
@@ -97,6 +120,12 @@ class Axis(Settings):
             raise ValueError("drive: voltage needs R, k_e and k_t")
         if self.drive in ("current", "speed-loop") and self.k_t is None:
             raise ValueError(f"drive: {self.drive} needs k_t")
+        rotary = self.motion == "rotary"
+        if self.drive == ("force" if rotary else "torque"):
+            raise ValueError(
+                f"drive: {self.drive} is of a {'linear' if rotary else 'rotary'} axis: use "
+                f"{'torque' if rotary else 'force'}"
+            )
         if self.drive == "speed-loop" and self.loop is None:
             raise ValueError("drive: speed-loop needs loop: {K_w: …}")
         if "supply_sag" in self.effects and self.V_dc is None:
@@ -114,11 +143,17 @@ class Axis(Settings):
         return self
 
     # declared with their units by the two kinds of axis
+    motion: Literal["rotary", "linear"]
     F_d: float
     F_s: float | None
     C: float
     k_t: float | None
     k_e: float | None
+
+    @property
+    def is_force(self) -> bool:
+        """Whether a measured force or torque drives."""
+        return self.drive in ("force", "torque")
 
     @property
     def inertia(self) -> float:

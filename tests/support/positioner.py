@@ -73,7 +73,11 @@ def table(bench: Table, seed: int, *, seconds: float = 16.0) -> Record:
         bench.spring, bench.stribeck, bench.counts, noise, out,
     )  # fmt: skip
     force = out[1] + bench.ripple * rng.standard_normal(n)
-    return Record((Cycle(0, {"t": t, "q": out[0], "force": force}),))
+    return Record((Cycle(0, {"t": t, "q": out[0], "force": force, "q_ref": reference}),))
+
+
+TABLE_LOOP = {"gives": "force", "K_p": 60000.0, "K_d": 1500.0, "limit": 400.0}
+SERVO_LOOP = {"gives": "duty", "K_p": 8.0, "limit": 1.0}
 
 
 def table_plant(bench: Table) -> dict[str, object]:
@@ -137,7 +141,9 @@ def servo(bench: Servo, seed: int, *, seconds: float = 16.0, off: tuple[float, f
         reference, on, bench.hz, bench.J, bench.gravity, bench.F_d, bench.C, bench.by_load, bench.constant, bench.k_t,
         bench.k_e, bench.R, bench.supply, bench.count, 8.0, out,
     )  # fmt: skip
-    channels = {"t": t, "theta_m": out[0], "u_q": out[1] * bench.supply}
+    channels = {"t": t, "theta_m": out[0], "u_q": out[1] * bench.supply, "theta_ref": reference}
+    if off:
+        channels["enabled"] = on
     return Record((Cycle(0, channels),))
 
 

@@ -60,7 +60,7 @@ def sizes(plant: AxisPlant) -> Sizes:
         if "u_q" in b.roles.outputs and not b.static:
             row = b.roles.outputs.index("u_q")
             voltage = max(voltage if voltage != 1.0 else 0.0, _rms(np.concatenate([w.outputs[row] for w in b.windows])))
-    torque = drive if p.drive == "force" else k_t * current
+    torque = drive if p.is_force else k_t * current
     position = np.concatenate([w.position for w in moving])
     low, high = float(position.min()), float(position.max())
     period = max((w.period for w in moving if not w.static), default=1e-3)
@@ -165,7 +165,7 @@ def _spring(plant: AxisPlant, s: Sizes) -> _Spec | None:
 
 
 def _flux(plant: AxisPlant, s: Sizes) -> _Spec | None:
-    if plant.plant.drive == "force":
+    if plant.plant.is_force:
         return None
     spec: _Spec = {"change": (-0.4, 0.4, (-0.02,), 0.02)}
     dT = [w.dT for w in plant.windows]
@@ -202,7 +202,7 @@ def _sag(plant: AxisPlant, s: Sizes) -> _Spec | None:
 
 
 def _saturation(plant: AxisPlant, s: Sizes) -> _Spec | None:
-    if plant.plant.drive == "force":
+    if plant.plant.is_force:
         return None
     return {"emf": (0.0, 0.3 / s.current**2, (0.03 / s.current**2,), 0.02 / s.current**2)}
 

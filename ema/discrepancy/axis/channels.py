@@ -18,7 +18,7 @@ ENTERING = 3  # samples before a limit, over which a position shows that it slow
 NOT_SLOWED = 0.4  # of its usual speed
 ONE_SCALE = 1.25  # ratio of the recorded speed to that of the position
 IN_STEP = 0.8  # correlation of the torque that the motion needs with the recorded one
-DRIVE_CHANNEL = {"current": "i_q", "voltage": "u_q", "force": "force", "speed-loop": "w_ref"}
+DRIVE_CHANNEL = {"current": "i_q", "voltage": "u_q", "force": "force", "torque": "torque", "speed-loop": "w_ref"}
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def roles(plant: Axis, record: Record) -> Roles:
     """Roles for this record; RecordError says what is missing."""
     position, speed = ("q", "v") if isinstance(plant, LinearAxis) else ("theta_m", "w_m")
     kind = _kind(plant, record)
-    drive = DRIVE_CHANNEL[kind]
+    drive = DRIVE_CHANNEL[plant.drive if plant.is_force else kind]
     require(record, ("t", drive), min_samples=2)
     have = record.channels
     if position not in have and speed not in have:
@@ -56,7 +56,8 @@ def roles(plant: Axis, record: Record) -> Roles:
             f"{record.name}: the axis does not move ({' and '.join(moving)} constant): nothing to compare"
         )
     _finite(record, (drive, *outputs))
-    _not_clipped(record, (drive, *moving), position)
+    commanded = kind in ("voltage", "speed-loop") or plant.position_loop is not None  # a drive may go to its limit
+    _not_clipped(record, tuple(moving) if commanded else (drive, *moving), position)
     if speed in have and position in have:
         _one_scale(record, position, speed)
     if speed in have and kind in ("current", "force"):
@@ -70,7 +71,7 @@ def _kind(plant: Axis, record: Record) -> str:
     if plant.drive == "current" and complete and "u_q" in record.channels:
         constant = all(np.ptp(cycle["u_q"]) == 0.0 and cycle["u_q"][0] != 0.0 for cycle in record)
         return "voltage" if constant else "current"
-    return plant.drive
+    return "force" if plant.is_force else plant.drive
 
 
 def _finite(record: Record, names: tuple[str, ...]) -> None:
@@ -113,7 +114,7 @@ def _in_step(plant: Axis, record: Record, drive: str, speed: str) -> None:
         width = min(21, cycle.n_samples // 8 * 2 + 1)
         smooth = savgol_filter(w, width, 2)
         need = plant.inertia * np.gradient(smooth, t) + plant.C * smooth + plant.F_d * np.sign(smooth)
-        given = savgol_filter(cycle[drive], width, 2) * (1.0 if drive == "force" else float(plant.k_t or 1.0))
+        given = savgol_filter(cycle[drive], width, 2) * (1.0 if plant.is_force else float(plant.k_t or 1.0))
         need, given = need - need.mean(), given - given.mean()
         lag = int(np.argmax(correlate(need, given, mode="same"))) - len(need) // 2
         here, there = _alike(need, given, 0), _alike(need, given, lag)

@@ -81,7 +81,7 @@ def _electrical(plant: AxisPlant, values: dict[str, float]) -> dict[str, Any]:
     sensor gains are one at twice that, proportional to the current.
     """
     p = getattr(plant.plant, "p", None)
-    if p is None or plant.plant.drive == "force":
+    if p is None or plant.plant.is_force:
         return {}
     other = {p: "current_offset", 2 * p: "current_gain"}.get(round(values["order"]))
     if other is None:

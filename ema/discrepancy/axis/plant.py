@@ -18,10 +18,12 @@ from ema.models.axis_layout import row
 
 from . import candidates, describe, structure
 from .balance import Balance, balance
+from .intake import intake
 from .naming import Numbers, numbers_of
 from .noise import ESTIMATE_UNCERTAINTY
 from .pack import Pack
 from .predictable import LONGEST_WINDOW, predictable
+from .undersampled import refuse_undersampled
 from .whitening import Filter, design, open_loop_variance
 from .windows import START_NOISE, Bench, Window, bench, speed_noise
 from .zeros import zeros
@@ -50,6 +52,9 @@ class AxisPlant:
 
     def __init__(self, plant: Axis, records: Sequence[Record], n_threads: int | None = None):
         self.plant = plant
+        records = intake(plant, records)
+        for record in records:
+            refuse_undersampled(plant, record)
         self.records = tuple(records)
         self.between = "straight"
         names = _distinct([r.source.stem if r.source else f"record {k + 1}" for k, r in enumerate(records)])

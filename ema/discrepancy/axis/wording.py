@@ -13,6 +13,8 @@ from ema.models.axis_config import LinearAxis
 from .agreeing import together
 from .balance.as_effects import point
 from .balance.telling import sentences, told
+from .closed_loop import closed_loop
+from .dropped import dropped
 from .plant import AxisPlant
 
 MOVED = 0.02  # of the plant file's friction: less is not worth a word
@@ -39,7 +41,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     notes = [*outcome.notes]
     if outcome.verdict != "adequate":
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
-    said = _balance(plant)
+    said = _balance(plant, outcome)
     verdict = shared.graded(outcome.verdict, gain)
     found, added = together(plant, [_effect(e) for e in outcome.effects], verdict)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
@@ -54,17 +56,25 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         [asdict(r) for r in outcome.records],
         _fitted(plant, outcome) if not added else _by_balance(plant),
         rest=outcome.rest,
+        rejected=dropped(plant, outcome, {name for e in found for name in (e.name, *e.indistinguishable_from)}),
         balance=said,
     )
 
 
-def _balance(plant: AxisPlant) -> dict[str, Any]:
+def _balance(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
     """The regression on the balance; empty where no stretch of motion is long enough."""
     found, linear = plant.balance, isinstance(plant.plant, LinearAxis)
     if found is None:
         return {}
     run = plant.errors(point(found, linear=linear), range(len(plant.blocks)))
-    return {**told(found, linear=linear), "free_run": {"err": run.error, "noise_floor": run.noise_floor}}
+    out = {**told(found, linear=linear), "free_run": {"err": run.error, "noise_floor": run.noise_floor}}
+    nominal = closed_loop(plant, dict(zip(outcome.base, outcome.k_before, strict=True)))
+    extended = closed_loop(plant, point(found, linear=linear))
+    if nominal is not None and extended is not None:
+        out["closed_loop"] = {
+            name: {"before": getattr(nominal, name), "after": getattr(extended, name)} for name in ("position", "drive")
+        }
+    return out
 
 
 def _by_balance(plant: AxisPlant) -> dict[str, Any]:

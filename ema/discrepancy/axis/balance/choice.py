@@ -85,7 +85,7 @@ class Balance:
 def balance(plant: AxisPlant) -> Balance | None:
     """The balance of all records; None where no stretch of motion is long enough."""
     p = plant.plant
-    plain = Plain(p.inertia, p.F_d, p.C, 1.0 if p.drive == "force" else float(p.k_t or 1.0))
+    plain = Plain(p.inertia, p.F_d, p.C, 1.0 if p.is_force else float(p.k_t or 1.0))
     recorded = courses(plant)
     found = rows(plant, recorded)
     if found is None:

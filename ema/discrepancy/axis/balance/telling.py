@@ -114,6 +114,9 @@ def sentences(balance: dict[str, Any]) -> list[str]:
     )
     if run := balance.get("free_run"):
         out[0] += f" Free runs with these numbers miss {run['err']:.2%} ({run['noise_floor']:.2%} is noise)."
+    if loop := balance.get("closed_loop"):
+        runs = " and ".join(f"the {name} {q['before']:.1%} before, {q['after']:.1%} after" for name, q in loop.items())
+        out.append(f"Closed-loop runs over the whole record miss {runs}.")
     implausible = [q["implausible"] for q in (*balance["base"].values(), *balance["terms"]) if "implausible" in q]
     return [*out, *(f"{text[0].upper()}{text[1:]}." for text in implausible)]
 

@@ -1,0 +1,38 @@
+"""What fits better and is not named is told with its numbers; a bound that was too narrow is widened and said."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ema.discrepancy.axis import candidates
+from ema.discrepancy.axis.dropped import dropped
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.outcome import Gain, Outcome
+from ema.discrepancy.selection import base_model
+from ema.models.axis_config import RotaryAxis
+
+
+def looked(axis_bench, drag, seed=1):
+    bench = axis_bench.Bench(C=2e-5 + drag)
+    record = axis_bench.record(bench, np.random.default_rng(seed), duration=1.0)
+    plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [record])
+    point = base_model(plant).fits[0].point
+    tried = [{"name": "viscous_drag", "round": 1, "score": 1000.0, "error": 10.0, "rms": 1.0}]
+    nothing = Gain(0.0, 0.0, 0.0)
+    return plant, Outcome("unexplained", "", 0.0, [], {}, nothing, nothing, [], [], [], [], tried, point=point)
+
+
+def test_a_parameter_at_its_bound_is_fitted_again_with_wider_ones(axis_bench, monkeypatch):
+    narrow = {"viscous_drag": lambda plant, s: {"coefficient": (0.0, 2e-5, (1e-5,), 1e-5)}}
+    monkeypatch.setattr(candidates, "_BUILDERS", {**candidates._BUILDERS, **narrow})
+    (entry,) = dropped(*looked(axis_bench, drag=1e-4), named=set())
+    assert entry["name"] == "viscous_drag"
+    assert "the end of what is searched (0 … 2e-05)" in entry["why"]
+    assert "10 times as wide viscous_drag.coefficient = 0.0001 " in entry["why"]
+    assert entry["after"] < entry["before"]
+
+
+def test_what_is_named_or_takes_nothing_is_not_told(axis_bench):
+    plant, outcome = looked(axis_bench, drag=1e-4)
+    assert dropped(plant, outcome, named={"viscous_drag"}) == []
+    assert dropped(*looked(axis_bench, drag=0.0), named=set()) == []
