@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -31,6 +32,7 @@ class Shown:
     reasons: Reason
     k: np.ndarray
     sd: np.ndarray
+    latency: float = 0.0  # from the cycle's last sample to the sending [s]
 
 
 @dataclass
@@ -60,6 +62,7 @@ class Live:
     heartbeat: dict[str, int] = field(default_factory=dict)
     heard_ns: int = 0  # the last heartbeat
     n_frames: int = 0
+    on_estimate: Callable[[str, Shown], object] = lambda method, shown: None
     events: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=_EVENTS))
 
     def __post_init__(self) -> None:
@@ -118,7 +121,10 @@ class Live:
         if (before.status if before else Status.VALID) != status:
             why = f" ({', '.join(reasons.names).replace('_', ' ')})" if reasons and status != Status.VALID else ""
             self.events.append((t_ns, f"actuator {number}: {method} is {_words(status)}{why}"))
-        self.estimates[number, method] = Shown(t_ns, int(one["cycle"]), status, reasons, one["k"], one["sd_k"])
+        self.estimates[number, method] = shown = Shown(
+            *(t_ns, int(one["cycle"]), status, reasons, one["k"], one["sd_k"], float(one["age"]))
+        )
+        self.on_estimate(method, shown)
         self.cycles[number] = int(one["cycle"])
 
     def _beat(self, t_ns: int, beat: dict[str, int]) -> None:
