@@ -43,11 +43,11 @@ def numeric_series(log: LogReader, codec: Codec) -> Iterator[Series]:
     with their interval of 95 % (k ± 1.96 sd within 0 … 1), parameters beside the faults, alarms and states as numbers
     (`ema.core.status`).
     """
-    from_frames = _FromFrames(codec)
+    from_frames = SamplesOfFrames(codec)
     last_ns: dict[str, int] = {}
     for entry in log.entries():
         try:
-            found = list(_of_message(entry, from_frames) if isinstance(entry, Message) else from_frames.take(*entry))
+            found = list(of_message(entry, from_frames) if isinstance(entry, Message) else from_frames.take(*entry))
         except (KeyError, TypeError, ValueError) as error:
             topic = entry.topic if isinstance(entry, Message) else "/can/frames"
             raise LogError(f"a message on {topic} is not what this version writes ({error!r})") from error
@@ -66,7 +66,7 @@ def _onward(series: Series, last_ns: dict[str, int]) -> Series:
     return series._replace(t_ns=t_ns)
 
 
-class _FromFrames:
+class SamplesOfFrames:
     """Samples of frames, at the times at which they were taken."""
 
     def __init__(self, codec: Codec):
@@ -76,6 +76,7 @@ class _FromFrames:
         self.started_ns: dict[tuple[int, int], int] = {}  # by actuator and cycle; the last two of each
 
     def take(self, bus: str, frames: np.ndarray) -> Iterator[Series]:
+        """Series of the frames that pass the protection."""
         receiver = self._receivers.setdefault(bus, Receiver(self._codec))
         good = frames[receiver.check(frames) <= GOOD]
         starts = self._codec.messages["CycleStart"].frame_id
@@ -119,7 +120,8 @@ class _FromFrames:
             self.started_ns[number, self._spans[number].cycle] = int(own["t_ns"][row])
 
 
-def _of_message(message: Message, frames: _FromFrames) -> Iterator[Series]:
+def of_message(message: Message, frames: SamplesOfFrames) -> Iterator[Series]:
+    """What of one message of the log, or one made from a frame on a live bus, is a number."""
     said = message.content
     kind = message.topic.split("/")[1]
     if kind == "estimate":

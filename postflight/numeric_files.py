@@ -60,7 +60,7 @@ class McapSeries(NumericFile):
 
     def _write(self, series: Series) -> None:
         if series.channel not in self._channels:
-            schema = self._writer.register_schema(f"ema.signals.{series.channel}", "jsonschema", _schema(series))
+            schema = self._writer.register_schema(f"ema.signals.{series.channel}", "jsonschema", schema_of(series))
             number = self._writer.register_channel(TOPIC + series.channel, "json", schema)
             self._channels[series.channel] = number, tuple(series.values)
         number, fields = self._channels[series.channel]
@@ -165,7 +165,8 @@ def open_numeric(out: Path, kind: str) -> NumericFile:
     return TableSeries(out, kind)
 
 
-def _schema(series: Series) -> bytes:
+def schema_of(series: Series) -> bytes:
+    """JSON schema of one sample."""
     fields = {
         name: {"type": "number", "description": f"{name} [{series.units[name]}]", "unit": series.units[name]}
         for name in series.values

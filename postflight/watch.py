@@ -11,6 +11,8 @@ import click
 from ema.core.ranges import FiniteRange
 
 if TYPE_CHECKING:
+    import threading
+
     from .live import Live
 
 _EVERY = 0.5  # the picture is renewed at 2 Hz, and at once for a key [s]
@@ -21,7 +23,15 @@ _LOOKS = 0.1  # for keys [s]
 @click.option("--bus", default="auto", show_default=True, metavar="BUS", help="auto, vcan0, udp_multicast …")
 @click.option("--for", "seconds", type=FiniteRange(min=0), metavar="S", help="End after so long. [s]")
 @click.option("--key-file", type=click.Path(path_type=Path), help="Of a bus whose frames are authenticated.")
-def watch(bus: str, seconds: float | None, key_file: Path | None) -> None:
+@click.option(
+    "--foxglove",
+    metavar="[PORT]",
+    type=click.IntRange(0, 65535),
+    is_flag=False,
+    flag_value=8765,
+    help="Serve the bus to Foxglove on this port of the loopback instead  [8765]",
+)
+def watch(bus: str, seconds: float | None, key_file: Path | None, foxglove: int | None) -> None:
     """Show alarms, each actuator's k with status, the daemon's heartbeat, losses and events, twice a second.
 
     Keys: j and k choose an alarm, a acknowledges it (the one thing that is ever sent), f filters, space freezes the
@@ -32,6 +42,7 @@ def watch(bus: str, seconds: float | None, key_file: Path | None) -> None:
     Examples:
       ema watch --bus vcan0
       ssh onboard ema watch --bus vcan0 --for 10
+      ema watch --bus vcan0 --foxglove
     """
     import signal
     import threading
@@ -53,7 +64,11 @@ def watch(bus: str, seconds: float | None, key_file: Path | None) -> None:
         signal.signal(number, lambda *_: stop.set())
     console, state, view = Console(), Live(codec.default()), View()
     end = time.monotonic() + (float("inf") if seconds is None else seconds)
-    with open_bus(parse(bus).model_copy(update={"key_file": key_file})) as port:
+    chosen = parse(bus).model_copy(update={"key_file": key_file})
+    if foxglove is not None:
+        _serve(chosen, foxglove, end, stop)
+        return
+    with open_bus(chosen) as port:
         commander = Commander(port, codec.default())
         picture = lambda: draw(state, port.choice, time.time_ns(), *console.size, view)  # noqa: E731
         if console.is_terminal and not console.is_dumb_terminal:
@@ -85,6 +100,19 @@ def _act(pressed: str, view: Any, state: Live, commander: Any) -> None:
         if change is not None:
             values = command_values(Action.ACK, change.cause, 0.0, state.codec)
             commander.send(COMMAND, change.actuator or 0, values)
+
+
+def _serve(chosen: Any, number: int, end: float, stop: threading.Event) -> None:
+    """The bus to every Foxglove that connects, until `end` or `stop`."""
+    from ema.bus import codec
+    from ema.bus.interface import open_bus
+
+    from .foxglove import FoxgloveServer
+
+    with open_bus(chosen) as port, FoxgloveServer(codec.default(), "127.0.0.1", number) as server:
+        click.echo(f"{port.choice}; in Foxglove open a connection to {server.url}")
+        while not stop.is_set() and time.monotonic() < end:
+            server.update(port.name, port.read(min(_EVERY, max(0.0, end - time.monotonic()))))
 
 
 def _listen(port: Any, state: Live, seconds: float) -> None:
