@@ -27,7 +27,7 @@ def check(out: Path, builder: Builder, plant: Actuator, replace: bool = False) -
     bundles.check_target(out)
     try:
         manifest = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return
     except (OSError, ValueError):
         manifest = None
