@@ -10,6 +10,7 @@ from pathlib import Path
 from ema.core.errors import BusError
 
 LARGEST = (1 << 32) - 1
+_YEARS = 1 << 28  # a clock so far ahead is not followed: numbers would run out [s]
 BLOCK = 64  # numbers taken from the file at once, so that a stranger's challenges do not wear the storage out
 
 
@@ -17,8 +18,9 @@ class Sessions:
     """Session numbers of what one process sends; each larger than all before.
 
     The file holds the next number that nobody has. It is written, and is on the disk, before a number out of it is
-    used, so a crash loses numbers and never repeats one; several processes may share it. Where there is none yet,
-    numbers begin at the seconds since 1970: should a file be lost, they most likely still increase.
+    used, so a crash loses numbers and never repeats one; several processes may share it. Numbers are no smaller than
+    the seconds since 1970: should a file be lost, or another machine take over, they most likely still increase. A
+    clock that is wrong costs no more than that.
 
     Parameters
     ----------
@@ -33,7 +35,7 @@ class Sessions:
 
     def take(self) -> int:
         """A number of a new session."""
-        if self._next == self._end:
+        if self._next == self._end or self._end < int(time.time()):
             self._reserve()
         self._next += 1
         return self._next - 1
@@ -55,10 +57,11 @@ class Sessions:
         self._next, self._end = first, first + BLOCK
 
     def _first(self, text: bytes) -> int:
+        now = int(time.time())
         if not text:
-            return int(time.time())
+            return now
         if not text.strip().isdigit() or int(text) > LARGEST - BLOCK:
             raise BusError(
                 f"session file {self._path}: is damaged; write a number into it that is larger than any session so far"
             )
-        return int(text)
+        return max(int(text), now) if now - int(text) < _YEARS else int(text)

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from ema.bus.header import sequence
 from ema.bus.interface import open_bus, parse
-from ema.bus.keys import Keyring
+from ema.bus.keys import MAC_BYTES, Keyring
+from ema.bus.load import frame_time
 from ema.bus.nodes import Node
 from ema.bus.protection import Check, Receiver, Sender
 from ema.bus.sealer import Sealer
@@ -286,6 +287,13 @@ def test_what_has_no_seal_in_time_is_refused(verifier, flight):
     assert verifier.feed(fr.empty(0), int(flight["t_ns"][0]) + PATIENCE_NS).size == 0
     (refused,) = verifier.feed(fr.empty(0), int(flight["t_ns"][0]) + PATIENCE_NS + 1)
     assert refused["flags"] & fr.FrameFlag.REFUSED
+
+
+def test_guessing_takes_longer_than_an_aircraft_lives():
+    """A forger who has the whole bus for himself sends 6 300 frames a second, and each is tried once."""
+    tries = 1 / frame_time(64, 1e6, 5e6)
+    years = 2 ** (8 * MAC_BYTES - 1) / tries / (365.25 * 86400)
+    assert years > 1e7
 
 
 def test_keys_are_changed_without_stopping(codec, sealer, verifier, flight):

@@ -29,6 +29,23 @@ def test_the_clock_does_not_matter_once_there_is_a_file(tmp_path, monkeypatch):
     assert Sessions(tmp_path / "s").take() > first
 
 
+def test_who_takes_over_on_another_machine_begins_later_sessions(tmp_path, monkeypatch):
+    """It was started first, and has its own file; its first session begins when it takes over."""
+    clock = [1_790_000_000]
+    monkeypatch.setattr(module.time, "time", lambda: float(clock[0]))
+    standby = Sessions(tmp_path / "standby")
+    clock[0] += 3600
+    main = Sessions(tmp_path / "main").take()
+    clock[0] += 3600
+    assert standby.take() > main
+
+
+def test_a_clock_in_the_next_century_is_not_followed(tmp_path, monkeypatch):
+    first = Sessions(tmp_path / "s").take()
+    monkeypatch.setattr(module.time, "time", lambda: 4.2e9)
+    assert Sessions(tmp_path / "s").take() < first + 1000
+
+
 @pytest.mark.parametrize("text", ["no number\n", "-5", "99999999999", "1\n2"])
 def test_a_damaged_file_is_refused_and_left_as_it_is(tmp_path, text):
     (tmp_path / "s").write_text(text)

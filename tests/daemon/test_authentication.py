@@ -1,15 +1,22 @@
 """Somebody who knows the DBC forges currents with the right CRC and number: with a key, no estimate changes."""
 
+import threading
+import time
+
 import numpy as np
 import pytest
 from e2e.p05 import e2e_p05_protect
+from ema_daemon.assembly import assembled
 from ema_daemon.settings import load
+from ema_simulator.node import run
+from ema_simulator.scenario import Scenario
 from sealed_bus import acquainted
 
 from ema.bus import codec as codecs
 from ema.bus import identifiers
 from ema.bus.header import sequence
-from ema.bus.interface import elsewhere
+from ema.bus.interface import BusSettings, elsewhere, open_bus
+from ema.bus.protection import Sender
 from ema.core import frames as fr
 from ema.core.status import Reason, Status
 from ema.log import LogReader, LogWriter
@@ -116,3 +123,47 @@ def test_another_bus_on_the_command_line_keeps_the_key(write_config, tmp_path):
     assert same.session_file == tmp_path / "s"
     assert (same.channel, same.key_file, same.options) == ("can1", tmp_path / "key", {"receive_buffer": 9})
     assert (other.interface, other.key_file, other.options) == ("virtual", tmp_path / "key", {})
+
+
+def test_a_daemon_an_actuator_and_a_listener_with_keys(write_config, shipped_plant, tmp_path):
+    """End to end: each asks whom it does not know, is answered, and goes on; without the key nothing is heard."""
+    key = tmp_path / "key"
+    key.write_text("5a" * 16)
+    key.chmod(0o600)
+    place = {"interface": "virtual", "channel": "locked"}
+    settings = load(write_config(bus=place | {"key_file": "key"}, monitor={"slower": {}}))
+    scenario = Scenario.model_validate({"seed": 3, "period": 1.0, "actuators": [{"number": 0}]})
+    stop = threading.Event()
+    found: dict[str, list[int]] = {"with": [], "without": []}
+
+    def heard(port, actuator):
+        frames = port.read(0.02)
+        frame_id = identifiers.with_actuator(CODEC.messages["EstimateLinear"].frame_id, actuator)
+        return frames["flags"][frames["id"] == frame_id].tolist()
+
+    with open_bus(BusSettings(**place)) as outside, open_bus(settings.bus) as listener, assembled(settings) as service:
+        actuators = open_bus(settings.bus, CODEC.filters("Tester"), "Actuator")
+        node = threading.Thread(target=run, args=(scenario, shipped_plant, actuators, CODEC, stop))
+        daemon = threading.Thread(target=service.run)
+        daemon.start()
+        node.start()
+        end = time.monotonic() + 60
+        while time.monotonic() < end and not any(not f & fr.FrameFlag.REFUSED for f in found["with"]):
+            found["with"] += heard(listener, 0)
+        stop.set()
+        node.join(20)
+        service.stop()
+        daemon.join(20)
+        actuators.close()
+        forged = CODEC.encode("EstimateLinear", 5, estimate_values())
+        outside.write(Sender().protect(forged))
+        end = time.monotonic() + 5
+        while time.monotonic() < end and not found["without"]:
+            found["without"] += heard(listener, 5)
+    assert any(not f & fr.FrameFlag.REFUSED for f in found["with"])
+    assert [bool(f & fr.FrameFlag.REFUSED) for f in found["without"]] == [True]
+
+
+def estimate_values():
+    return {name: np.zeros((1, field.n_values)) if field.n_values else 0
+            for name, field in CODEC.messages["EstimateLinear"].fields.items()}  # fmt: skip
