@@ -35,7 +35,7 @@ class Sessions:
 
     def take(self) -> int:
         """A number of a new session."""
-        if self._next == self._end or self._end < int(time.time()):
+        if self._next == self._end or 0 < int(time.time()) - self._end < _YEARS:
             self._reserve()
         self._next += 1
         return self._next - 1
