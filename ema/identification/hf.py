@@ -1,9 +1,9 @@
 """Iterative identification with the HF model itself, warm-started from LF2. Needs a JIT: never in the daemon's process.
 
-Base points and columns of a step are the 16 lanes of one batch. Switching decorrelates two runs at any distance, so a
-difference of two runs is mostly noise; instead all runs of a cycle together correct LF2 near the iterate
-(`correction`), and Gauss–Newton runs on what is thus the HF model without its noise. What the runs leave open is
-part of the covariance.
+The runs of a step are the 16 lanes of one batch: some at the last answer, the others where the truth may be if that
+answer is off by what it says. Switching decorrelates two runs at any distance, so a difference of two runs is mostly
+noise; instead all runs of a cycle together correct LF2 near the answer (`correction`), and Gauss–Newton runs on what is
+thus the HF model without its noise. What the runs leave open, where the truth may be, is part of the covariance.
 """
 
 from __future__ import annotations
@@ -30,26 +30,24 @@ SEED = 0x48460000  # of the model's noise; any but the measured actuator's own
 
 
 class Options(NamedTuple):
-    """How many batches of HF runs at most and at least, columns at ±`dk`, and when a step is small [its sd]."""
+    """How many batches of HF runs at most and at least, and when a step is small [its sd]."""
 
     n_most: int = 5
     n_least: int = 3
-    dk: float = 0.04
-    n_base: int = 4
+    n_base: int = 4  # runs of a batch at the answer itself
+    reach: float = 0.1  # from the answer, within which all runs are [share of a complete failure]
     tolerance: float = 0.3
-    length: float = 0.5  # correlation length of LF2's error over ‖k‖, …
-    length_least: float = 0.1  # … not less than this
 
 
 @dataclass(frozen=True)
 class _Left(NoiseModel):
-    """Noise when the model's error is known but for what a correction leaves."""
+    """Noise when the model's error is known but for what a correction leaves, on average where the truth may be."""
 
-    correction: Correction
+    left: np.ndarray
 
     def of_model(self, k: np.ndarray) -> np.ndarray:
         """What the runs leave open of the error, shape (n_omega, n_omega). [A²]"""
-        return self.correction.covariance(k)
+        return self.left
 
 
 class HfInLoop:
@@ -69,29 +67,42 @@ class HfInLoop:
         x_runs, y_runs = np.zeros((0, len(self.first.nuisance.bounds[0]))), np.zeros((0, len(measurement.i_hat)))
         for step in range(o.n_most):
             before, at = e, self.first.nuisance.point(e)
-            x = self._columns(at)
+            rng = np.random.default_rng(SEED + step)
+            x = np.vstack([np.tile(at, (o.n_base, 1)), self._around(e, rng)])
             y = self.model(x, measurement.start) - self.first.model(x, measurement.start)
             x_runs, y_runs = np.vstack([x_runs, x]), np.vstack([y_runs, y])
-            e = self._corrected(x_runs, y_runs, at, measurement).estimate(measurement)
+            elsewhere = self._around(e, rng)  # no run was there: the truth is at none of the runs' points either
+            e = self._corrected(x_runs, y_runs, at, elsewhere, measurement).estimate(measurement)
             if step + 1 >= o.n_least and np.max(np.abs(e.k - before.k) / np.sqrt(np.diag(e.covariance))) < o.tolerance:
                 break
         return e
 
-    def _columns(self, x: np.ndarray) -> np.ndarray:
-        """Points of a batch: x itself and x ± dk in each element, pushed inside the bounds."""
-        sides = self.options.dk * np.vstack([np.eye(len(x)), -np.eye(len(x))])
-        return np.vstack([np.tile(x, (self.options.n_base, 1)), np.clip(x + sides, *self.first.nuisance.bounds)])
+    def _around(self, e: Estimate, rng: np.random.Generator) -> np.ndarray:
+        """Where the truth may be: points of an answer's distribution, shape (2 d, d), pushed inside the bounds.
 
-    def _corrected(self, x: np.ndarray, y: np.ndarray, at: np.ndarray, measurement: Measurement) -> GaussNewton:
+        Its mean and covariance are those of the points x ± √d L Q, L Lᵀ = C, for any orthogonal Q; Q is drawn, so that
+        batches see different directions (Genz, Monahan, SIAM J. Sci. Comput. 19 (1998) 426).
+        """
+        nuisance = self.first.nuisance
+        x, C = nuisance.point(e), nuisance.spread(e)
+        Q = np.linalg.qr(rng.standard_normal(C.shape))[0]
+        sides = np.sqrt(len(x)) * (np.linalg.cholesky(C) @ Q).T
+        sides *= np.minimum(self.options.reach / np.linalg.norm(sides, axis=1, keepdims=True), 1.0)
+        return np.clip(x + np.vstack([sides, -sides]), *nuisance.bounds)
+
+    def _corrected(
+        self, x: np.ndarray, y: np.ndarray, at: np.ndarray, elsewhere: np.ndarray, measurement: Measurement
+    ) -> GaussNewton:
         noise, smooth = self.first.noise, self.first.model
         M = noise.covariance(measurement.start, at) - noise.switching
-        length = max(self.options.length * float(np.linalg.norm(at)), self.options.length_least)
-        correction = Correction(x, y, self.switching, M, length)
+        correction = Correction(x, y, self.switching, M)
         own = {field.name: getattr(noise, field.name) for field in fields(NoiseModel)}
         if measurement.start is not None:
             own["start"] = own["start_k"] = np.zeros_like(noise.start)  # HF knows what the start state does
         return GaussNewton(
-            *(self.method, lambda x, start: smooth(x, start) + correction(x), _Left(**own, correction=correction)),
+            self.method,
+            lambda x, start: smooth(x, start) + correction(x),
+            _Left(**own, left=correction.covariance(elsewhere)),
             lambda m: at,
             nuisance=self.first.nuisance,
         )

@@ -121,6 +121,14 @@ class Nuisance:
         nu = np.zeros(len(self)) if e.nuisance is None else (e.nuisance.value - self.centre) / self.scale
         return np.concatenate([e.k, nu])
 
+    def spread(self, e: Estimate) -> np.ndarray:
+        """Covariance of x of an estimate, before the bounds, shape (6 + m, 6 + m)."""
+        if e.nuisance is None:
+            return e.covariance
+        units = np.concatenate([np.ones(N_FAULTS), self.scale])
+        with_k = e.nuisance.covariance / self.scale[:, None] / units
+        return np.vstack([np.hstack([e.covariance, with_k[:, :N_FAULTS].T]), with_k])
+
     def effects(self, x: np.ndarray, declared: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, Any]]:
         """Effects at points `x` (n, 6 + m) as the HF model takes them; `declared` are the plant's own."""
         values: dict[str, dict[str, Any]] = {}
