@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ema.core.closing import Closing
+from ema.core.files import require_file
 
 logger = logging.getLogger("ema.daemon")
 
@@ -33,7 +34,7 @@ class StateFile(Closing):
     def load(self) -> dict[str, Any] | None:
         """What was kept; None where there is nothing. ValueError when it is not JSON of an object."""
         try:
-            stored = json.loads(self.path.read_bytes())
+            stored = json.loads(require_file(self.path).read_bytes())
         except FileNotFoundError:
             return None
         except (OSError, ValueError, RecursionError) as error:

@@ -19,6 +19,7 @@ from pydantic import ConfigDict
 
 from ema.core.config import Settings, digest, validate
 from ema.core.errors import BundleError, ConfigError
+from ema.core.files import require_file
 from ema.core.names import FAULTS
 from ema.core.signatures import TrustedKey, sign, signer
 from ema.core.version import version
@@ -240,7 +241,7 @@ def load(path: str | Path, trusted: Sequence[TrustedKey] = ()) -> Bundle:
     path = Path(path)
     manifest_path = path / "manifest.json"
     try:
-        content = manifest_path.read_bytes()
+        content = require_file(manifest_path).read_bytes()
         signed_by = _signer(path, content, trusted) if trusted else ""
         manifest = json.loads(content.decode())
     except FileNotFoundError as error:
@@ -274,12 +275,17 @@ def _array(path: Path, name: str, sha256: str) -> np.ndarray:
     if Path(name).name != name:
         raise BundleError(f"{path / 'manifest.json'}: array entry '{name[:40]}' is damaged")
     try:
-        content = file.read_bytes()  # once, so that what is used is what was checked
+        content = require_file(file).read_bytes()  # once, so that what is used is what was checked
         if hashlib.sha256(content).hexdigest() != sha256:
             raise BundleError(f"{file}: is damaged (SHA-256 differs from the manifest's)")
-        array: np.ndarray = np.load(io.BytesIO(content), allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+        array = np.load(io.BytesIO(content), allow_pickle=False)
+    except OSError as error:
+        raise BundleError(f"{file}: cannot be read ({error.strerror or error})") from error
+    except (ValueError, EOFError) as error:
         raise BundleError(f"{file}: cannot be read ({error})") from error
+    if not isinstance(array, np.ndarray):
+        array.close()
+        raise BundleError(f"{file}: is an archive of arrays (.npz); one array (.npy) is wanted")
     return array
 
 
@@ -345,4 +351,4 @@ def _is_covariance(S: np.ndarray, definite: bool) -> bool:
 
 
 def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hashlib.sha256(require_file(path).read_bytes()).hexdigest()

@@ -13,8 +13,8 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Discriminator, Field, RootModel, Tag, field_validator, model_validator
 
-from ema.core.config import Settings
-from ema.core.units import quantity, to_unit
+from ema.core.config import Settings, holds_bool
+from ema.core.units import LARGEST, quantity, to_unit
 
 Point = tuple[float, float]
 
@@ -70,8 +70,8 @@ class Points(RootModel[Annotated[tuple[Point, ...], Field(min_length=1)]]):
     @field_validator("root")
     @classmethod
     def _increasing(cls, points: tuple[Point, ...]) -> tuple[Point, ...]:
-        if not all(math.isfinite(x) for point in points for x in point):
-            raise ValueError("times and values must be finite")
+        if not all(abs(x) <= LARGEST for point in points for x in point):
+            raise ValueError(f"times and values must be within ±{LARGEST:g}")
         if any(later[0] <= earlier[0] for earlier, later in pairwise(points)):
             raise ValueError("the times must increase")
         return points
@@ -121,6 +121,13 @@ class Profile(
 
     low: ClassVar[float] = -math.inf
     high: ClassVar[float] = math.inf
+
+    @model_validator(mode="before")
+    @classmethod
+    def _numbers(cls, value: Any) -> Any:
+        if holds_bool(value):
+            raise ValueError("true and false are no numbers")
+        return value
 
     @model_validator(mode="after")
     def _within(self) -> Self:

@@ -76,9 +76,11 @@ class Scenario(Settings):
 
     actuator: str = "actuator.yaml"  # plant file, beside the scenario or shipped with the project
     bus: BusSettings = BusSettings()
-    period: float = quantity("s", "from the start of one test cycle to the next", 1.0, gt=0)
-    return_time: float = quantity("s", "to go back to zero after the test motion", 0.25, gt=0)
-    stagger: float = quantity("s", "each actuator begins its test motion so much after the one before it", 0.0, ge=0)
+    period: float = quantity("s", "from the start of one test cycle to the next", 1.0, gt=0, le=86400)
+    return_time: float = quantity("s", "to go back to zero after the test motion", 0.25, gt=0, le=60)
+    stagger: float = quantity(
+        "s", "each actuator begins its test motion so much after the one before it", 0.0, ge=0, le=60
+    )
     n_cycles: int | None = Field(default=None, ge=1, description="stop after so many cycles; absent: go on")
     rate: float = Field(default=1.0, gt=0, le=1000, description="scenario time over real time")
     seed: int = Field(default=0, ge=0)

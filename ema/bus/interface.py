@@ -9,19 +9,36 @@ from typing import Any
 import can
 from pydantic import Field
 
-from ema.core.config import Settings
-from ema.core.errors import BusError
+from ema.core.config import Settings, validate
+from ema.core.errors import BusError, ConfigError
 
 from .authenticated import AuthenticatedPort, challenges, session_file_of
 from .codec import default
-from .multicast import GROUP, MulticastPort
-from .port import Filters, Port
+from .multicast import GROUP, PORT, MulticastPort
+from .port import RECEIVE_BUFFER, Filters, Port
 from .python_can import PythonCanPort
 from .socketcan import SocketCanPort
 
 AUTO = "auto"
 VCAN = "vcan0"
-OWN: dict[str, Callable[..., Port]] = {"socketcan": SocketCanPort, "udp_multicast": MulticastPort}
+
+
+class OwnOptions(Settings):
+    """Options of the ports of our own."""
+
+    receive_buffer: int = Field(default=RECEIVE_BUFFER, ge=1, le=1 << 30, description="asked of the kernel [B]")
+
+
+class MulticastOptions(OwnOptions):
+    """Options of ``udp_multicast``."""
+
+    port: int = Field(default=PORT, ge=1, le=65535, description="UDP port")
+
+
+OWN: dict[str, tuple[Callable[..., Port], type[OwnOptions]]] = {
+    "socketcan": (SocketCanPort, OwnOptions),
+    "udp_multicast": (MulticastPort, MulticastOptions),
+}
 
 
 class BusSettings(Settings):
@@ -33,7 +50,7 @@ class BusSettings(Settings):
     """
 
     interface: str = AUTO
-    channel: str = ""
+    channel: str = Field(default="", pattern=r"^[^\x00]*$")
     options: dict[str, Any] = Field(default_factory=dict)
     key_file: Path | None = None
     session_file: Path | None = None
@@ -96,10 +113,12 @@ def _open(settings: BusSettings, filters: Filters | None) -> Port:
     interface, channel = settings.interface, settings.channel or _default_channel(settings.interface)
     name = f"{interface}:{channel}"
     if interface in OWN:
+        kind, known = OWN[interface]
         try:
-            return OWN[interface](channel, filters, **settings.options)
-        except TypeError as error:
-            raise BusError(f"bus {name} cannot be opened ({error})") from error
+            given = validate(settings.options, known, f"bus {name} cannot be opened: options")
+            return kind(channel, filters, **given.model_dump())
+        except ConfigError as error:
+            raise BusError(str(error)) from error
     options: dict[str, Any] = {"fd": True} if interface != "virtual" else {"protocol": can.CanProtocol.CAN_FD}
     try:
         bus = can.Bus(interface=interface, channel=channel, **{**options, **settings.options})

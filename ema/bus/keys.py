@@ -18,6 +18,7 @@ from cryptography.hazmat.primitives.hashes import SHA256
 from cryptography.hazmat.primitives.kdf.hkdf import HKDF
 
 from ema.core.errors import BusError
+from ema.core.files import require_file
 
 from .identifiers import N_ACTUATORS
 from .nodes import Node
@@ -81,7 +82,7 @@ def load_keys(path: Path) -> Keyring:
     What systemd hands to a service (LoadCredential=) only that can read, though its mode may look otherwise.
     """
     try:
-        with path.open("rb") as file:
+        with require_file(path).open("rb") as file:
             status = os.fstat(file.fileno())
             raw = file.read(_LARGEST + 1)
         lines = raw.decode("ascii").splitlines()

@@ -30,9 +30,10 @@ _MAX_BYTES = 512  # a packed frame of 64 bytes takes about 210
 _CONTROL = socket.CMSG_SPACE(16) + socket.CMSG_SPACE(4)  # receive time and drop count
 _MAX_FOREIGN = 4 * MAX_BATCH  # looked at in one read before the processor is given back
 _MAPS = tuple(bytes([kind]) for kind in (*range(0x80, 0x90), 0xDE))  # how a packed map begins
-_KEY = b"\xaearbitration_id\xce"  # then 32 bits
+_KEY = b"\xaearbitration_id"
+_SHORT, _LONG = 0x10000, 0xCE  # smaller identifiers are packed shorter than after this mark of 32 bits
 _KEY_AT = len(b"\x8b\xa9timestamp\xcb") + 8
-_ID_AT = _KEY_AT + len(_KEY)
+_MARK_AT = _KEY_AT + len(_KEY)
 _FLAG_BITS = {
     "is_extended_id": FrameFlag.EXTENDED,
     "is_remote_frame": FrameFlag.REMOTE,
@@ -70,6 +71,7 @@ class MulticastPort(Port):
         self._filters = filters
         self._flood = Flood()
         self._wanted: dict[int, set[int]] = {}  # identifiers by mask
+        self._are_long = all(frame_id >= _SHORT for frame_id, _ in filters or ())
         for frame_id, mask in filters or ():
             self._wanted.setdefault(mask, set()).add(frame_id & mask)
         try:
@@ -83,9 +85,9 @@ class MulticastPort(Port):
             self._out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)  # never leaves this machine
             self._out.bind((_LOOPBACK, 0))
             self._out.connect((group, port))
-        except (OSError, OverflowError) as error:
+        except OSError as error:
             self.close()
-            raise BusError(f"bus {self.name} cannot be opened ({getattr(error, 'strerror', None) or error})") from error
+            raise BusError(f"bus {self.name} cannot be opened ({error.strerror or error})") from error
         if warning:
             self._events.append(f"{self.name}: {warning}")
         self._own_address = self._out.getsockname()
@@ -156,19 +158,22 @@ class MulticastPort(Port):
             n_foreign -= 1
             rows.append((t_ns, frame_id, flags, length))
             payloads.append(data)
-        self._flood.note(n_foreign, self.counters.kernel_drops, time.monotonic())
-        self._flooded = self._flood.flooded
         out = fr.empty(len(rows))
         if rows:
             out["t_ns"], out["id"], out["flags"], out["length"] = np.array(rows, np.uint64).T
             out["data"] = np.frombuffer(b"".join(payloads), np.uint8).reshape(-1, fr.MAX_DATA)
-        return out if self._filters is None else out[passes(out, self._filters)]
+        wanted = out if self._filters is None else out[passes(out, self._filters)]
+        self._flood.note(n_foreign + out.size - wanted.size, self.counters.kernel_drops, time.monotonic())
+        self._flooded = self._flood.flooded
+        return wanted
 
     def _is_foreign(self, packed: bytes) -> bool:
         """Whether a frame in python-can's usual layout is none that is received; seen without unpacking it."""
-        if not self._wanted or packed[_KEY_AT:_ID_AT] != _KEY:
+        if not self._wanted or packed[_KEY_AT:_MARK_AT] != _KEY or len(packed) < _MARK_AT + 5:
             return False
-        frame_id = int.from_bytes(packed[_ID_AT : _ID_AT + 4], "big")
+        if packed[_MARK_AT] != _LONG:
+            return self._are_long
+        frame_id = int.from_bytes(packed[_MARK_AT + 1 : _MARK_AT + 5], "big")
         return not any(frame_id & mask in ids for mask, ids in self._wanted.items())
 
     def _told(self, control: list[tuple[int, int, bytes]]) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import sidecar
 from .errors import RecordError
+from .files import require_file
 from .records import Record
 from .table import Array, Table
 from .table_records import record_of
@@ -45,7 +46,7 @@ def read_mat(path: str | Path, plan: sidecar.Sidecar | None = None) -> Record:
     """
     path = Path(path)
     try:
-        with path.open("rb") as file:
+        with require_file(path).open("rb") as file:
             is_hdf = b"MATLAB 7.3" in file.read(128)
         vectors = dict(_vectors(_hdf(path) if is_hdf else _matlab(path)))
     except ModuleNotFoundError as error:

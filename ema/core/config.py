@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Hashable
+from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast, get_args
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
 from .errors import ConfigError
+from .files import require_file
 from .units import to_unit
 
 S = TypeVar("S", bound="Settings")
@@ -25,15 +28,30 @@ class Settings(BaseModel):
     @classmethod
     def _number_with_unit(cls, value: Any, info: ValidationInfo) -> Any:
         field = cls.model_fields[info.field_name or ""]
-        if isinstance(value, bool) and field.annotation in (float, int):
-            raise ValueError("is no number")  # which Python takes it for
+        if holds_bool(value) and not _may_hold_bool(cast(Hashable, field.annotation)):
+            raise ValueError("true and false are no numbers")  # which Python takes them for
         extra = field.json_schema_extra
         if isinstance(value, str) and isinstance(extra, dict) and "unit" in extra:
             return to_unit(value, str(extra["unit"]))
         return value
 
 
+def holds_bool(value: Any) -> bool:
+    """Whether true or false is anywhere in it, where numbers are meant."""
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ()
+    return isinstance(value, bool) or any(holds_bool(part) for part in parts)
+
+
+@cache
+def _may_hold_bool(annotation: Any) -> bool:
+    """Whether a field of this type may be given true or false: itself, or a section, which looks for itself."""
+    if annotation in (bool, Any) or (isinstance(annotation, type) and issubclass(annotation, BaseModel)):
+        return True
+    return any(_may_hold_bool(part) for part in get_args(annotation))
+
+
 _MOST_VALUES = 1_000_000
+_MOST_BYTES = 16_000_000  # of a file
 
 
 def _n_values(node: Any, known: dict[int, int]) -> int:
@@ -76,7 +94,7 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     """Read a YAML mapping; ConfigError names the file and the line."""
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = require_file(path, _MOST_BYTES).read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .errors import RecordError
+from .files import require_file
 from .sidecar import Sidecar
 from .table import Array, Table
 from .units import is_unit
@@ -63,7 +64,7 @@ def read_text(path: Path, side: Sidecar) -> Table:
 def _lines(path: Path, side: Sidecar) -> list[tuple[int, str]]:
     """Header and rows with their place in the file; blank lines and comments are left out."""
     try:
-        text = path.read_text(encoding=side.encoding)
+        text = require_file(path).read_text(encoding=side.encoding)
     except OSError as error:
         raise RecordError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:

@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import Field
 
+LARGEST = 1e12  # no quantity of an actuator, a flight or a log, in the unit it is declared in, is larger
 _TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*((?:1?\s*/\s*)?[^\W\d_].*|[°%].*)", re.DOTALL)
 _UNIT = re.compile(r"[\w°%/*^ .()-]{0,60}")
 _NO_POWER = re.compile(r"(?:\*\*|\^)\s*-?(?:\d\d|\s*\d?\s*(?:\*\*|\^))")  # pint would calculate 9**9**9**9
@@ -114,8 +115,13 @@ def quantity(unit: str, meaning: str, default: Any = ..., **bounds: Any) -> Any:
     >>> class Motor(Settings):
     ...     R: float = quantity("ohm", "phase resistance", gt=0)
 
-    A text such as ``"1065 mohm"`` is converted (by `ema.core.config.Settings`).
+    A text such as ``"1065 mohm"`` is converted (by `ema.core.config.Settings`). Without a bound of its own a quantity
+    is within ± LARGEST.
     """
+    if not bounds.keys() & {"le", "lt"}:
+        bounds["le"] = LARGEST
+    if not bounds.keys() & {"ge", "gt"}:
+        bounds["ge"] = -LARGEST
     return Field(
         default,
         allow_inf_nan=False,

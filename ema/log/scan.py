@@ -18,6 +18,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata
 
 from ema.core.errors import LogError
+from ema.core.files import require_file
 
 from . import records as at_rest
 from .ledger import Ledger, Missing
@@ -74,7 +75,7 @@ class McapFile:
         self._searched = False
         self.missing: list[Missing] = []
         try:
-            self._file = path.open("rb")
+            self._file = require_file(path).open("rb")
             self._size = self._file.seek(0, io.SEEK_END)
         except OSError as error:
             raise LogError(f"{path}: cannot be read ({error.strerror})") from error

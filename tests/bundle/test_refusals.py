@@ -146,3 +146,15 @@ def test_arbitrary_bytes_are_refused(copy, data):
     (copy / "manifest.json").write_bytes(data)
     with pytest.raises(EmaError):
         bundle.load(copy)
+
+
+def test_an_archive_in_the_place_of_an_array_is_refused(copy):
+    import hashlib
+
+    file = copy / "i0.npy"
+    with file.open("wb") as stream:
+        np.savez(stream, i0=np.load(copy / "A.npy"))
+    manifest = json.loads((copy / "manifest.json").read_text())
+    manifest["arrays"]["i0"]["sha256"] = hashlib.sha256(file.read_bytes()).hexdigest()
+    with pytest.raises(BundleError, match=r"i0\.npy: is an archive of arrays"):
+        bundle.load(edited(copy, **manifest))

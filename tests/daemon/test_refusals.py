@@ -13,8 +13,11 @@ import yaml
 from ema_daemon.assembly import assembled
 from ema_daemon.settings import load
 
+from ema.bus.codec import default
+from ema.bus.interface import BusSettings, open_bus
 from ema.core import resources
-from ema.core.errors import BundleError, BusError, ConfigError, LogError
+from ema.core.config import validate
+from ema.core.errors import BundleError, BusError, ConfigError, EmaError, LogError
 
 
 def refused(path):
@@ -108,6 +111,29 @@ def test_log_directory_that_cannot_be_written(write_config):
 def test_unknown_bus(write_config, bus):
     with pytest.raises(BusError, match=r"nocan7|telepathy"):
         refused(write_config(bus=bus))
+
+
+NONSENSE = [99_999_999, -1, 10**400, 1.5, float("nan"), "many", [1], {"a": 1}, None, True, "\0"]
+
+
+@pytest.mark.parametrize("value", NONSENSE, ids=lambda value: str(value)[:20])
+@pytest.mark.parametrize("key", ["channel", "port", "group", "receive_buffer", "filters", "colour"])
+@pytest.mark.parametrize("interface", ["udp_multicast", "socketcan", "virtual"])
+def test_nonsense_as_an_option_of_the_bus_is_one_line_or_harmless(interface, key, value):
+    """What is given to an interface is checked by it; whatever it says, it is one line of ours."""
+    said = []
+    channel, options = "239.78.7.7" if interface == "udp_multicast" else "nocan7", {}
+    if key == "channel" and isinstance(value, str):
+        channel = value
+    elif key != "channel":
+        options[key] = value
+    try:
+        said_otherwise = {"interface": interface, "channel": channel, "options": options}
+        settings = validate(said_otherwise, BusSettings, "bus of daemon.yaml")
+        open_bus(settings, default().filters("Actuator")).close()
+    except EmaError as error:
+        said.append(str(error))
+    assert all(text.startswith("bus ") for text in said)
 
 
 def test_the_user_sees_one_line(write_config, tmp_path):
