@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,8 @@ from typing import Any
 import click
 
 from ema.core.ranges import FiniteRange
+
+_BYTES_PER_SAMPLE = 9 * 8  # nine channels
 
 
 @click.command(short_help="Simulated actuators whose faults grow, on the bus or as a record.")
@@ -40,7 +43,7 @@ def simulate(path: str, csv_path: str | None, actuator: int | None, truth: str |
     numbers = [a.number for a in scenario.actuators]
     if csv_path is not None:
         lane = _lane(numbers, actuator)
-        _refuse_record(scenario, csv_path)
+        _refuse_record(scenario, plant, csv_path)
     with TruthFile(truth, numbers) if truth else nullcontext() as truth_file:
         on_cycle = truth_file.add if truth_file else lambda cycle: None
         if csv_path is not None:
@@ -56,7 +59,7 @@ def _refuse_ignored(csv_path: str | None, actuator: int | None, bus: str | None,
         raise click.UsageError("--actuator says which one --csv writes: on a bus are all of them")
 
 
-def _refuse_record(scenario: Any, path: str) -> None:
+def _refuse_record(scenario: Any, plant: Any, path: str) -> None:
     """What would be found only after all cycles have been simulated."""
     from ema.core.csv_records import refuse_taken
     from ema.core.errors import ConfigError
@@ -64,6 +67,13 @@ def _refuse_record(scenario: Any, path: str) -> None:
     if scenario.n_cycles is None:
         raise ConfigError("a record needs an end: give the scenario n_cycles, or the command --cycles")
     refuse_taken(Path(path))
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    most = memory // 2 // (plant.n_samples * _BYTES_PER_SAMPLE)  # a record is written when it is whole
+    if scenario.n_cycles > most:
+        raise ConfigError(
+            f"a record of {scenario.n_cycles} cycles does not fit into this machine's memory: at most {most}; "
+            "put them onto a bus (without --csv), where there is no limit"
+        )
 
 
 def _lane(numbers: list[int], actuator: int | None) -> int:

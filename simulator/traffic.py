@@ -9,7 +9,7 @@ import numpy as np
 from ema.bus.codec import Codec
 from ema.bus.identifiers import with_actuator
 from ema.bus.protection import Sender
-from ema.bus.span import MOTION_RATIO, SAMPLES_PER_FRAME, Span
+from ema.bus.span import MOTION_RATIO, N_CYCLES, SAMPLES_PER_FRAME, Span
 from ema.core.names import CURRENTS
 
 from .fleet import CycleData
@@ -55,7 +55,7 @@ class Traffic:
         n_times, dt = cycle.t.size, float(cycle.t[1] - cycle.t[0])
         slow = slice(0, n_times, MOTION_RATIO)
         first_current, first_motion = (self._next_sequence(name, number) for name in ("PhaseCurrents", "Motion"))
-        span = Span(cycle.number, first_current, first_motion, n_times, dt, self._chirp)
+        span = Span(cycle.number % N_CYCLES, first_current, first_motion, n_times, dt, self._chirp)
         begin = lane * self._stagger
         due_current = begin + np.arange(1, span.n_currents + 1) * SAMPLES_PER_FRAME * dt
         due_motion = begin + np.arange(1, span.n_motions + 1) * SAMPLES_PER_FRAME * MOTION_RATIO * dt

@@ -8,6 +8,9 @@ SAMPLES_PER_FRAME = 10  # as the DBC lays them out
 MOTION_RATIO = 10  # current samples to one motion sample
 
 
+N_CYCLES = 1 << 32  # after so many, cycles are numbered from 0 again
+
+
 class Span(NamedTuple):
     """What CycleStart and CycleEnd say: which frames are the cycle's."""
 

@@ -11,7 +11,7 @@ from ema.bus import identifiers
 from ema.bus.codec import Codec
 from ema.bus.header import sequence
 from ema.bus.protection import Receiver
-from ema.bus.span import Span
+from ema.bus.span import N_CYCLES, Span
 from ema.bus.stream import GOOD, Check
 from ema.core import frames as fr
 from ema.core.frames import FrameFlag, is_overflow
@@ -216,7 +216,7 @@ class Assembler:
 
     def _closed(self, assembly: Assembly, cycle: AssembledCycle) -> Iterator[AssembledCycle | Event]:
         previous, number = assembly.previous, cycle.span.cycle
-        if previous is not None and number != previous + 1:
+        if previous is not None and number != (previous + 1) % N_CYCLES:
             text = (
                 f"cycles {previous + 1}…{number - 1} were not seen" if number > previous + 1
                 else f"cycle {number} follows cycle {previous}: the actuator has restarted"

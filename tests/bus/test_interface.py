@@ -1,8 +1,11 @@
+import can
 import numpy as np
 import pytest
 
 from ema.bus import interface
 from ema.bus.interface import BusSettings, open_bus, parse
+from ema.bus.port import MAX_BATCH
+from ema.bus.python_can import PythonCanPort
 from ema.core.errors import BusError
 
 
@@ -62,3 +65,25 @@ def test_auto_takes_the_next_best_and_says_why(monkeypatch):
     with open_bus(parse("auto")) as port:
         assert port.choice.startswith("bus virtual:ema chosen; bus socketcan:no-such-vcan cannot be opened (")
         assert "udp_multicast:10.0.0.1" in port.choice
+
+
+class Storm(can.BusABC):
+    """A controller that tells nothing but errors, as fast as it is asked."""
+
+    def __init__(self):
+        super().__init__("storm")
+        self.n_asked = 0
+
+    def _recv_internal(self, timeout):
+        self.n_asked += 1
+        return can.Message(is_error_frame=True), True
+
+    def send(self, msg, timeout=None):
+        pass
+
+
+def test_a_storm_of_error_frames_does_not_keep_a_read():
+    port = PythonCanPort(Storm(), "storm")
+    assert port.read(10.0).size == 0
+    assert 0 < port.counters.n_error_frames <= MAX_BATCH
+    port.close()

@@ -236,3 +236,32 @@ def test_an_actuator_restarted_at_any_moment_loses_no_cycle_beyond_the_one(fligh
     assert [cycle.span.cycle for cycle in last] == [1, 2, 3, 4, 5]
     assert not any(cycle.missing.any() or cycle.reasons & ~counted for cycle in last)
     assert not any(cycle.reasons for cycle in last[1:])
+
+
+def numbered_from(fly, first, growing):
+    """A flight whose cycles are numbered from `first` on, modulo 2³²."""
+    from ema_simulator.traffic import Traffic
+
+    traffic, batches = Traffic(codecs.default(), [0]), []
+    for cycle, _ in fly(**growing):
+        frames, due = traffic.frames(cycle._replace(number=first + cycle.number), 1.0)
+        frames["t_ns"] = np.round(1e9 * (1_000 + cycle.t_start + due)).astype(np.int64)
+        batches.append(frames)
+    return np.concatenate(batches)
+
+
+def test_after_two_to_the_thirty_two_cycles_they_are_numbered_from_zero_and_nothing_is_missed(fly, growing, assemble):
+    cycles, events = assemble(numbered_from(fly, 2**32 - 3, growing))
+    assert [c.span.cycle for c in cycles] == [2**32 - 3, 2**32 - 2, 2**32 - 1, 0, 1, 2]
+    assert not any(c.missing.any() or c.reasons for c in cycles)
+    assert events == []
+
+
+def test_a_restart_at_the_last_number_loses_no_cycle(fly, growing, assemble):
+    before = numbered_from(fly, 2**32 - 6, growing)
+    after = numbered_from(fly, 0, growing)
+    after["t_ns"] += 10 * 10**9
+    cycles, events = assemble(np.concatenate([before, after]))
+    assert [c.span.cycle for c in cycles] == [2**32 - 6 + n for n in range(6)] + list(range(6))
+    assert not any(c.missing.any() for c in cycles)
+    assert events == []  # the numbers go on as if nothing had happened

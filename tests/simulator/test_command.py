@@ -70,6 +70,17 @@ def test_a_record_that_is_there_already_is_refused_before_any_work(write, tmp_pa
     assert not (tmp_path / "t.csv").exists()
 
 
+def test_a_record_larger_than_the_machine_is_refused_before_any_work(write, tmp_path):
+    words = ["--csv", "x.csv", "--cycles", 10**9]
+    done = ema("simulate", "--scenario", write("seed: 1"), *words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith(
+        "ema: a record of 1000000000 cycles does not fit into this machine's memory: at most "
+    )
+    assert done.stderr.count("\n") == 1
+    assert not list(tmp_path.glob("*.csv"))
+
+
 def test_nothing_is_overwritten(write, tmp_path):
     (tmp_path / "t.csv").write_text("mine")
     done = ema("simulate", "--scenario", write("n_cycles: 1"), "--truth", tmp_path / "t.csv")
