@@ -6,6 +6,7 @@ from ema_simulator.traffic import Traffic
 
 from ema.bus import codec as codecs
 from ema.bus.header import sequence
+from ema.bus.protection import Sender
 from ema.core.status import Reason, Status
 from ema.monitor import Event
 
@@ -128,6 +129,22 @@ def test_one_that_changes_the_currents_of_a_few_frames_only(bench, send):
     other = send(FAULTY, 4, 0.0)
     currents = np.flatnonzero(other["id"] == CODEC.messages["PhaseCurrents"].frame_id)
     few = other[currents[700:900:20]]  # of the second cycle, 20 ms apart
+    few["t_ns"] -= np.uint64(200_000)
+    estimates, _ = answers(bench, merged(first, few))
+    assert estimates[1].estimate.status == Status.INVALID
+    assert estimates[1].estimate.reasons & Reason.TWO_SPEAKERS
+
+
+def test_one_that_changes_positions_only(bench, send):
+    """The first of Motion decides the start state."""
+    first, other = send(NOTHING, 4, 0.0), send(FAULTY, 4, 0.0)
+    motions = other[other["id"] == CODEC.messages["Motion"].frame_id]
+    few = motions[51:60:3]  # of the second cycle
+    few["data"][:, 4:] ^= 1
+    e2e = Sender()
+    for n, frame in enumerate(few):
+        e2e.skip(int(frame["id"]), (int(sequence(few[n : n + 1])[0]) - e2e.next_sequence(int(frame["id"]))) % 65536)
+        few[n : n + 1] = e2e.protect(few[n : n + 1].copy())
     few["t_ns"] -= np.uint64(200_000)
     estimates, _ = answers(bench, merged(first, few))
     assert estimates[1].estimate.status == Status.INVALID
