@@ -30,6 +30,7 @@ def _estimate(cycle, actuator=0, method="linear", t_ns=None, k=0.1):
         "sd": np.full(6, 0.01),
         "p_value": 0.5,
         "residual": 0.01,
+        "age": 0.01,
     }
 
 
@@ -57,6 +58,7 @@ def _status(t_ns=1_700_000_000_000_000_000):
         "uptime": 1.0,
         "log_state": "ok",
         "log_free": 1e9,
+        "lapses": [],
         "counters": {"frames_lost": 0},
     }
 

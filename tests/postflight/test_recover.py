@@ -4,7 +4,7 @@ import pytest
 from click.testing import CliRunner
 from ema_postflight.recover import recover
 
-from ema.core.errors import LogError
+from ema.core.errors import LogError, NegativeAnswer
 from ema.log import LogSettings, recovery, schemas
 from ema.log.scan import McapFile
 from ema.log.segmented import SegmentedLog
@@ -21,8 +21,8 @@ def unfinished(tmp_path):
 
 
 def test_a_copy_is_written_beside_the_log(unfinished):
-    answer = CliRunner().invoke(recover, [str(unfinished)], catch_exceptions=False)
-    assert answer.exit_code == 0
+    answer = CliRunner().invoke(recover, [str(unfinished)])
+    assert isinstance(answer.exception, NegativeAnswer)  # exit status 1: it was not sound
     assert answer.output.startswith(f"{unfinished.with_suffix('')}.recovered.mcap: 1 messages")
 
 
