@@ -10,8 +10,6 @@ import click
 from ema.core.errors import LogError, NegativeAnswer
 from ema.core.folders import make_folder
 
-_SUFFIX = ".recovered.mcap"
-
 
 @click.command(short_help="Finished copies of unfinished or damaged logs.")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
@@ -30,17 +28,17 @@ def recover(logs: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
     Example:
       ema recover /var/log/ema/ema-20250314T091500000Z-0003.mcap
     """
-    from ema.log.reader import find_logs
+    from ema.log.reader import COPY_SUFFIX, find_logs
 
     if out is not None:
         make_folder(out)
     answers: list[dict[str, object]] = []
     failures = []
     for path in find_logs(logs, (".mcap",)):
-        if path.name.endswith(_SUFFIX) and path not in logs:
+        if path.name.endswith(COPY_SUFFIX) and path not in logs:
             continue
         try:
-            answers.append(_one(path, (out or path.parent) / (path.stem + _SUFFIX)))
+            answers.append(_one(path, (out or path.parent) / (path.stem + COPY_SUFFIX)))
         except LogError as error:
             failures.append(error)
             answers.append({"log": str(path), "error": str(error)})

@@ -16,7 +16,9 @@ from . import batches, schemas
 from .folder import is_held
 from .retention import newest
 from .scan import Damage, McapFile
+from .segment import BEFORE_KEY
 
+COPY_SUFFIX = ".recovered.mcap"
 DAMAGE_KEY = "damage_of_the_original"  # in the metadata of a recovered copy
 Paths = str | Path | Iterable[str | Path]
 
@@ -97,14 +99,19 @@ class LogReader(Closing):
         return [*map(str, self.damage), *(f"{path}: was not finished: what came last may be missing" for path in cut)]
 
     def remarks(self) -> list[str]:
-        """What else is to be known: a log still being written, a copy of a damaged one."""
+        """What else is to be known: a log still being written, a copy of a damaged one, a segment that is not there."""
         live = [f"{path}: is still being written" for path in self.unfinished if _is_live(path)]
-        copies = ((file.path, file.metadata()) for file in self._files)
-        return live + [
-            f"{path}: is a copy of {said.get('recovered_from', 'another log')}, in which was wrong: {said[DAMAGE_KEY]}"
-            for path, said in copies
-            if DAMAGE_KEY in said
-        ]
+        copies, absent = [], []
+        names = {file.path.name for file in self._files}
+        for place, file in enumerate(self._files):
+            said = file.metadata()
+            if DAMAGE_KEY in said:
+                source = said.get("recovered_from", "another log")
+                copies.append(f"{file.path}: is a copy of {source}, in which was wrong: {said[DAMAGE_KEY]}")
+            before = said.get(BEFORE_KEY)
+            if place and before is not None and not {before, before.replace(".mcap", COPY_SUFFIX)} & names:
+                absent.append(f"{file.path}: follows {before}, which is not among the files read")
+        return live + copies + absent
 
     def messages(self, wanted: Callable[[str], bool] = lambda topic: True) -> Iterator[Message]:
         """Messages on the wanted topics, without the raw frames, in the order they were written."""

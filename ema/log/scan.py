@@ -73,6 +73,7 @@ class McapFile:
         self._report = report
         self._topics: dict[int, str] = {}
         self._searched = False
+        self._metadata: dict[str, str] | None = None
         self.missing: list[Missing] = []
         try:
             self._file = require_file(path).open("rb")
@@ -138,6 +139,7 @@ class McapFile:
             ledger.again()
 
         before: Index = {}
+        pairs: dict[str, str] = {}
         behind, n_attachments = 0, 0
         for place in self._data.places(another):
             if place.opcode == Opcode.CHUNK:
@@ -145,21 +147,21 @@ class McapFile:
                 block = self._chunk(place, index, ledger, start_ns, end_ns)
                 before = _index_of(block) if block else {}
             elif place.opcode == Opcode.MESSAGE_INDEX:
-                channel, entries = at_rest.message_index(place, self._read)
-                if place.offset >= behind and before.get(channel) != entries:
-                    self.note(place.offset, "a message index without its chunk")
-                    ledger.lose(channel, [t_ns for t_ns, _ in entries])
+                if place.offset >= behind:
+                    self._orphan(place, before, ledger)
                 continue
             elif place.opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
                 block = at_rest.block(place.offset, self._read(place.offset, place.end - place.offset))
             else:
                 n_attachments += place.opcode == Opcode.ATTACHMENT
+                pairs |= self._pairs(place) if place.opcode == Opcode.METADATA else {}
                 continue
             if block is not None:
                 for message in block.messages:
                     ledger.take(message.channel, message.sequence, message.t_ns)
                 self._topics |= self._defined(block)
                 yield block
+        self._metadata = pairs
         self._compare(ledger, n_attachments, alone)
 
     def attachments(self) -> Iterator[Attachment]:
@@ -177,15 +179,12 @@ class McapFile:
 
     def metadata(self) -> dict[str, str]:
         """Key-value pairs of the metadata records, joined."""
-        pairs: dict[str, str] = {}
-        for place in self._data.places():
-            if place.opcode == Opcode.METADATA:
-                try:
-                    record = parse(Metadata, self._read(place.begin, min(place.length, LIMIT)))
-                    pairs |= record.metadata if record.name != CHANNELS else {}
-                except UNREADABLE:
-                    self.note(place.offset, "metadata is damaged")
-        return pairs
+        if self._metadata is None:
+            pairs: dict[str, str] = {}
+            for place in self._data.places():
+                pairs |= self._pairs(place) if place.opcode == Opcode.METADATA else {}
+            self._metadata = pairs
+        return self._metadata
 
     def topic(self, channel: int, offset: int) -> str:
         """Topic of a channel; empty, and noted, where it is not known."""
@@ -214,6 +213,21 @@ class McapFile:
     def _contradictions(self) -> list[str]:
         summary = read_summary(self._size, self._read)
         return contradictions(summary, self._read) if summary else []
+
+    def _pairs(self, place: Place) -> dict[str, str]:
+        try:
+            record = parse(Metadata, self._read(place.begin, min(place.length, LIMIT)))
+        except UNREADABLE:
+            self.note(place.offset, "metadata is damaged")
+            return {}
+        return dict(record.metadata) if record.name != CHANNELS else {}
+
+    def _orphan(self, place: Place, before: Index, ledger: Ledger) -> None:
+        """A message index that does not follow its chunk; one of the chunk `before` that was itself damaged does."""
+        channel, entries = at_rest.message_index(place, self._read)
+        if before.get(channel) != entries:
+            self.note(place.offset, "a message index without its chunk")
+            ledger.lose(channel, [t_ns for t_ns, _ in entries])
 
     def _chunk(self, place: Place, index: Index, ledger: Ledger, low: int, high: int) -> Block | None:
         """Records of a chunk; None when it is outside the time range, or damaged."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from .numbered import NumberedWriter
 from .schemas import Encoded, Kind
 
+BEFORE_KEY = "segment_before"  # in the metadata: its name, so that one that is taken away is missed
 _CHUNK_SIZE = 4 << 20
 _MEDIA_TYPES = {".dbc": "text/plain", ".yaml": "application/yaml", ".json": "application/json"}
 

@@ -21,7 +21,7 @@ from . import contents, retention, schemas
 from .batches import Batcher
 from .folder import FolderLock
 from .schemas import Encoded
-from .segment import Segment
+from .segment import BEFORE_KEY, Segment
 from .settings import LogSettings
 
 _MB = 1_000_000
@@ -199,6 +199,9 @@ class SegmentedLog:
         moment = datetime.fromtimestamp(t_ns / 1e9, UTC)
         name = f"{self._prefix}-{moment:%Y%m%dT%H%M%S}{moment.microsecond // 1000:03d}Z-{self._number:04d}.mcap"
         metadata = {"software": version(), **self._metadata, "segment": str(self._number)}
+        before = retention.segments(self.directory, self._prefix)
+        if before:
+            metadata[BEFORE_KEY] = before[-1].name
         self._segment = Segment(self.directory / name, t_ns, self._attachments, metadata)
         self._opened_at, self._cut = clock, False
 

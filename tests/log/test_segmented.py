@@ -290,3 +290,17 @@ def test_a_disk_filled_by_others_does_not_eat_the_log(tmp_path, make):
         _write(log, make, [second], float(second))
     assert log.state is LogState.FULL
     assert len(list(tmp_path.glob("*.mcap"))) == 4
+
+
+def test_a_segment_that_was_taken_away_is_missed(tmp_path, make):
+    for run in range(2):
+        log = _open(tmp_path, segment_time=1, keep_segments=5)
+        for second in range(3):
+            _write(log, make, [3 * run + second], float(second))
+        log.close()
+    with LogReader(tmp_path) as back:  # the oldest have gone, as they may
+        assert back.remarks() == []
+    second, third = sorted(tmp_path.glob("*.mcap"), key=lambda path: path.stem[-4:])[1:3]
+    second.unlink()
+    with LogReader(tmp_path) as back:
+        assert back.remarks() == [f"{third}: follows {second.name}, which is not among the files read"]
