@@ -6,8 +6,8 @@ gains each by a share drawn from N(0, spread²). Each goes from cycle to cycle w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +66,12 @@ def growths() -> Iterator[Flight]:
     """Each fault grows linearly from 0, two or three actuators each."""
     lanes = [(FAULTS[n % 6], ((0.0, 0.0), (float(N_GROWTH), GROWTH))) for n in range(N_LANES)]
     yield Flight("growth", N_GROWTH, FAULTY_SPREAD, tuple(lanes))
+
+
+def shortened(flights: Iterable[Flight], most: int | None) -> Iterator[Flight]:
+    """Flights of at most so many cycles, under names of their own."""
+    for flight in flights:
+        yield flight if most is None else replace(flight, name=f"{flight.name}-{most}", n_cycles=most)
 
 
 @dataclass(frozen=True)

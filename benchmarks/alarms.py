@@ -41,6 +41,7 @@ from ._alarm_flights import (
     flown,
     growths,
     healthy,
+    shortened,
     steps,
 )
 from .identification import quick_bundle
@@ -143,17 +144,18 @@ def _growth_lags(
     return lags
 
 
-def rows() -> list[dict[str, Any]]:
+def rows(most: int | None = None) -> list[dict[str, Any]]:
+    """The bench's table; of each flight at most so many cycles."""
     bundle = quick_bundle()
     settings = config.load(resources.config("alarms.yaml"), AlarmSettings)
     table: list[dict[str, Any]] = []
     n_cycles = 0
-    for flight in healthy():
+    for flight in shortened(healthy(), most):
         seen = flown(flight, bundle)
         n_cycles += seen.status.size
         table += _false(flight, seen, raised(flight, seen, settings))
     table.append(_row("healthy cycles in all", n_cycles))
-    return table + list(_delays(bundle, settings))
+    return table + list(_delays(bundle, settings, most))
 
 
 def _false(flight: Flight, seen: Flown, alarms: list[Raised]) -> Iterator[dict[str, Any]]:
@@ -171,10 +173,10 @@ def _false(flight: Flight, seen: Flown, alarms: list[Raised]) -> Iterator[dict[s
     yield _row(f"{flight.name}: cycles with the model in doubt", doubted)
 
 
-def _delays(bundle: Bundle, settings: AlarmSettings) -> Iterator[dict[str, Any]]:
+def _delays(bundle: Bundle, settings: AlarmSettings, most: int | None) -> Iterator[dict[str, Any]]:
     """Delays of the shipped setpoints, fault by fault, and alarms of other faults than the one that is there."""
     others: Counter[str] = Counter()
-    for flight in steps():
+    for flight in shortened(steps(), most):
         seen = flown(flight, bundle)
         alarms = raised(flight, seen, settings)
         for lane, (fault, points) in enumerate(flight.faults):
@@ -188,7 +190,7 @@ def _delays(bundle: Bundle, settings: AlarmSettings) -> Iterator[dict[str, Any]]
                 if size >= 1.1 * setpoint:
                     name = f"step of {fault} to {size:g}, actuator {lane % 2}: cycles to {level.name.lower()}"
                     yield _row(name, float(came[0]) if came else np.inf, "cycles")
-    for flight in growths():
+    for flight in shortened(growths(), most):
         alarms = raised(flight, flown(flight, bundle), settings)
         for j, fault in enumerate(FAULTS):
             for level, setpoint in zip(

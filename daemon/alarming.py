@@ -56,6 +56,7 @@ class AlarmDesk:
         self._sender = Sender()
         self._n_beats = 0
         self._changed = False
+        self._asked: Command | None = None
         self._none = codec.encode(ALARM, 0, alarm_values(None, 0, 0, codec))
 
     def start(self, t_ns: int) -> None:
@@ -86,11 +87,16 @@ class AlarmDesk:
 
     def take(self, heard: Heard) -> None:
         """Do what an operator asks, or note a temperature."""
-        self._tell(self.alarms.hear(heard))
-        if isinstance(heard, Command):
+        if not isinstance(heard, Command):
+            self._tell(self.alarms.hear(heard))
+            return
+        asked = heard._replace(t_ns=0)
+        if asked != self._asked:  # a command is sent twice
             whose = "monitor" if heard.actuator is None else f"actuator {heard.actuator}"
             logger.info("%s: %s of alarm %s asked for", whose, heard.action.name.lower(), heard.cause)
-            self._save()
+        self._asked = asked
+        self._tell(self.alarms.hear(heard))
+        self._save()
 
     def estimate(self, out: Identified) -> None:
         """Take an estimate; those of the identifier that runs in every cycle are judged."""

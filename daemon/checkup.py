@@ -20,7 +20,7 @@ from ema.bus.port import RECEIVE_BUFFER
 from ema.core.errors import EmaError
 from ema.core.version import version
 
-from .settings import load, load_bundles
+from .settings import load, load_alarms, load_bundles
 
 _FD_MTU = 72
 _ARPHRD_CAN = "280"
@@ -155,6 +155,11 @@ def _configuration(path: Path) -> Iterator[Finding]:
         yield Finding("bundles", Verdict.OK, "; ".join(made))
     except EmaError as error:
         yield Finding("bundles", Verdict.BAD, str(error), "build it for this actuator: ema build --config … --out …")
+    try:
+        load_alarms(settings)
+        yield Finding("thresholds of alarms", Verdict.OK, settings.alarms.file or "as shipped")
+    except EmaError as error:
+        yield Finding("thresholds of alarms", Verdict.BAD, str(error), "correct the file")
     yield _log_directory(Path(settings.log.directory), settings.log.keep_free)
 
 

@@ -149,6 +149,7 @@ def _do(
     from ema.alarms.bus import COMMAND, command_values
     from ema.bus import codec
     from ema.bus.commanding import Commander
+    from ema.core.status import AlarmState
 
     named = [] if names == ("all",) else [_parse(name) for name in names]
     with _opened(bus, key_file) as port:
@@ -157,7 +158,9 @@ def _do(
         commander = Commander(port, codec.default())
         for actuator, cause in wanted:
             commander.send(COMMAND, actuator or 0, command_values(action, cause, duration, codec.default()))
-        _listen(port, listener, _ANSWERS_WITHIN, lambda: all(done(_state(listener, key)) for key in wanted))
+        # what is latched-cleared may go by this, or stay: that is awaited, and both is well
+        settled = lambda state: done(state) and state != AlarmState.LATCHED_CLEARED  # noqa: E731
+        _listen(port, listener, _ANSWERS_WITHIN, lambda: all(settled(_state(listener, key)) for key in wanted))
         stuck = [key for key in wanted if not done(_state(listener, key))]
     for key in wanted:
         change = listener.find(*key)

@@ -12,6 +12,7 @@ from benchmarks.__main__ import _cells
 
 # Constants of the module, arguments of its rows().
 SMALLEST = {
+    "alarms": ({}, {"most": 2}),
     "bus": ({"ROUNDS": 1}, {}),
     "campaign": ({"N_RUNS": 32, "N_TASKS": 4}, {}),
     "daemon": ({}, {"actuators": (1,), "n_cycles": 1, "turns": ()}),
