@@ -42,7 +42,7 @@ class SupervisionSettings(Settings):
 
     silence: float = quantity("s", "an actuator that is on is heard more often than this", 1.0, gt=0, le=60)
     listen: float = quantity("s", "so long another monitor is listened for before this one speaks", 1.5, ge=0, le=60)
-    cycle: float = quantity("s", "test cycles of an actuator come more often than this", 2.0, gt=0, le=86400)
+    cycle: float = quantity("s", "test cycles of an actuator come more often than this", 1.7, gt=0, le=86400)
     age: dict[str, float] = Field(
         default={"linear": 1.0, "lf2": 2.0, "hf": 10.0},
         description="by identifier: an estimate sent longer than this after its cycle's last sample is late [s]",

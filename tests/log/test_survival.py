@@ -61,13 +61,30 @@ def test_after_a_power_cut_all_that_was_synced_is_there(tmp_path, make, monkeypa
     log.close()
 
 
-def test_a_real_file_system_that_fills_and_empties(tmp_path):
-    script = 'mount -t tmpfs -o size=2m none "$1" && exec "$2" "$3" "$1"'
-    program = ["unshare", "--map-root-user", "--mount", "sh", "-c", script, "sh"]
-    arguments = [str(tmp_path), sys.executable, str(SUPPORT / "log_full_disk.py")]
+def on_small_disk(folder, script):
+    """What a script of tests/support prints that logs into a file system of its own of 2 MB."""
+    mounting = 'mount -t tmpfs -o size=2m none "$1" && exec "$2" "$3" "$1"'
+    program = ["unshare", "--map-root-user", "--mount", "sh", "-c", mounting, "sh"]
+    arguments = [str(folder), sys.executable, str(SUPPORT / script)]
     if subprocess.run(["unshare", "--map-root-user", "--mount", "true"], capture_output=True, check=False).returncode:
         pytest.skip("this kernel lets no user mount a small file system of their own (unshare)")
-    result = json.loads(subprocess.run(program + arguments, check=True, capture_output=True, text=True).stdout)
+    return json.loads(subprocess.run(program + arguments, check=True, capture_output=True, text=True).stdout)
+
+
+def test_a_folder_that_becomes_read_only_and_writable_again(tmp_path):
+    """What is written before stays; what comes meanwhile is counted; afterwards the log goes on by itself."""
+    result = on_small_disk(tmp_path, "log_read_only.py")
+    states = result["states"]
+    assert set(states[:10]) == {"OK"}
+    assert set(states[11:29]) == {"FAILED"}
+    assert set(states[31:]) == {"OK"}
+    assert result["logged"] == result["accepted"]
+    assert {*range(10), *range(32, 40)} <= set(result["logged"])
+    assert "log_resumed" in result["events"]
+
+
+def test_a_real_file_system_that_fills_and_empties(tmp_path):
+    result = on_small_disk(tmp_path, "log_full_disk.py")
     states = result["states"]
     assert set(states[:9]) == {"OK"}
     assert set(states[12:29]) == {"FULL"}
