@@ -55,7 +55,7 @@ def _git(*words: str) -> str:
     return subprocess.run(["git", *words], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
 
 
-def rows(path: Path) -> list[dict[str, Any]]:
+def read_rows(path: Path) -> list[dict[str, Any]]:
     """What is in a results file."""
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
 
@@ -107,7 +107,7 @@ def main(trials: int, threads: int, out: Path) -> None:
     from benchmarks.discrepancy import examined
 
     out.parent.mkdir(parents=True, exist_ok=True)
-    found, here = rows(out), commit()
+    found, here = read_rows(out), commit()
     try:
         of_one_commit([*found, {"commit": here}])
     except MixedCommitsError as error:
