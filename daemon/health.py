@@ -73,7 +73,7 @@ class Health:
                 Promise(Lapse.BUS_OFF): bus is not BusState.BUS_OFF,
                 Promise(Lapse.ERROR_PASSIVE): bus is not BusState.ERROR_PASSIVE,
                 Promise(Lapse.FLOODED): not self.port.flooded,
-                Promise(Lapse.LOG): self.log.state is LogState.OK,
+                Promise(Lapse.LOG): self.log.state is LogState.OK and not self.log.hangs,
                 **{Promise(Lapse.SECOND_MONITOR, n): n not in self.contested for n in self.monitor.actuators},
                 **{worker_of(method): answers() for method, answers in self.answering.items()},
             }
@@ -81,7 +81,9 @@ class Health:
         events = [Event(wall_ns, Level.WARNING, "link", line) for line in self.port.take_events()]
         for change in table.look():
             self.n_timeout += change.lapsed and change.promise.actuator is not None
-            detail = f": it is {self.log.state.name.lower()}" if change.promise.lapse is Lapse.LOG else ""
+            detail = ""
+            if change.promise.lapse is Lapse.LOG:
+                detail = ": its device hangs" if self.log.hangs else f": it is {self.log.state.name.lower()}"
             if told := event(change, wall_ns, detail):
                 events.append(told)
         self.state = self._judge()

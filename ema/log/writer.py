@@ -21,6 +21,7 @@ from .segmented import SegmentedLog
 from .settings import LogSettings
 
 _BACKLOG_LIMIT = 32_000_000  # bytes waiting for the thread; beyond, messages are dropped and counted
+_PATIENCE = 2.0  # for a device to take what has come since it was written to last [s]
 _logger = logging.getLogger("ema.log")
 
 
@@ -75,6 +76,7 @@ class LogWriter(Closing):
         self._overflow = 0
         self._stopping = False
         self._broken = False
+        self._working_since: float | None = None  # monotonic [s]
         self._free = self._log.free_bytes
         self._thread = threading.Thread(target=self._run, name="ema-log", daemon=True)
         self._thread.start()
@@ -83,6 +85,12 @@ class LogWriter(Closing):
     def state(self) -> LogState:
         """OK, FULL or FAILED."""
         return LogState.FAILED if self._broken else self._log.state
+
+    @property
+    def hangs(self) -> bool:
+        """Whether the device has not taken what it was given for so long that nothing is known to be written."""
+        since = self._working_since
+        return since is not None and time.monotonic() - since > _PATIENCE
 
     @property
     def dropped(self) -> int:
@@ -177,10 +185,12 @@ class LogWriter(Closing):
             self._queue.clear()
             self._backlog = 0
             stopping = self._stopping
+        self._working_since = time.monotonic()
         for job in jobs:
             job()
         self._log.tick(time.time_ns(), time.monotonic())
         self._free = self._log.free_bytes
+        self._working_since = None
         return not stopping
 
 

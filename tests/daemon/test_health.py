@@ -29,7 +29,7 @@ class World:
     def __init__(self, scripted, worker=None, **settings):
         self.monitor = SimpleNamespace(counts=Counts(), n_cycles=0, n_estimates=0, heard={}, actuators=frozenset({3}))
         self.port = scripted([], lambda: None)
-        self.log = SimpleNamespace(state=LogState.OK, dropped=0, free_bytes=5 << 20)
+        self.log = SimpleNamespace(state=LogState.OK, dropped=0, free_bytes=5 << 20, hangs=False)
         self.worker = SimpleNamespace(answers=True)
         remote = {} if worker is None else {worker: lambda: self.worker.answers}
         slower = {"lf2": LF2_EVERY} if worker is None else {worker: LF2_EVERY}
@@ -234,6 +234,12 @@ def test_a_full_log_degrades_and_is_said_once(world):
     assert world.health.heartbeat(0.0)["log_state"] == LogState.FULL
     world.log.state = LogState.OK
     assert world.go(1.0) == [(0.25, "log_over")]
+
+
+def test_a_log_whose_device_hangs_is_not_written(world):
+    world.log.hangs = True
+    assert world.go(1.0) == [(0.25, "log")]
+    assert world.state is ServiceState.DEGRADED
 
 
 def test_what_happens_to_the_link_is_an_event(world):

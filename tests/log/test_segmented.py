@@ -1,5 +1,7 @@
 import errno
 import os
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -304,3 +306,23 @@ def test_a_segment_that_was_taken_away_is_missed(tmp_path, make):
     second.unlink()
     with LogReader(tmp_path) as back:
         assert back.remarks() == [f"{third}: follows {second.name}, which is not among the files read"]
+
+
+def test_a_device_that_hangs_is_seen(tmp_path, make, monkeypatch):
+    gate, entered = threading.Event(), threading.Event()
+
+    def stuck(self, t_ns, clock):
+        entered.set()
+        gate.wait(30)
+
+    monkeypatch.setattr("ema.log.writer._PATIENCE", 0.05)
+    monkeypatch.setattr("ema.log.segmented.SegmentedLog.tick", stuck)
+    with LogWriter(tmp_path) as log:
+        assert entered.wait(30)
+        time.sleep(0.1)
+        assert log.hangs
+        gate.set()
+        deadline = time.monotonic() + 30
+        while log.hangs and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert not log.hangs
