@@ -54,6 +54,11 @@ class InMemory:
         return io.BytesIO(self._data)
 
 
+@pytest.fixture(autouse=True)
+def in_memory(monkeypatch):
+    monkeypatch.setattr("ema.log.scan.require_file", lambda path: path)
+
+
 class Read:
     """What a reader finds in a file of these bytes."""
 
