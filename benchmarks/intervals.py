@@ -24,7 +24,7 @@ from ema.bundle import Bundle
 from ema.identification import Measurement, identifier
 from ema.models.envelope import envelope
 
-from .frozen import MixedCommitsError, commit, of_one_commit, rows
+from .frozen import MixedCommitsError, commit, of_one_commit, read_rows
 from .identification import quick_bundle
 from .strata import as_actuator
 
@@ -102,7 +102,7 @@ def _cells(these: list[dict[str, Any]]) -> str:
 def main(cycles: int, out: Path) -> None:
     """Run the cycles of this commit that are missing, and print the table."""
     out.parent.mkdir(parents=True, exist_ok=True)
-    found, here = rows(out), commit()
+    found, here = read_rows(out), commit()
     try:
         of_one_commit([*found, {"commit": here}])
     except MixedCommitsError as error:
