@@ -333,6 +333,22 @@ def test_a_node_that_has_lost_its_sessions_is_refused_and_named(codec, sealer, v
     assert judged(verifier, sealed(again, flight))[0].size == 0
 
 
+def test_an_answer_to_a_challenge_must_be_the_node_s_own(codec, sealer, flight):
+    """Everybody on the bus sees the nonce: an answer with anything in it changed is not believed, the genuine one is."""
+    verifier = Verifier(codec, RING)
+    verifier.feed(sealed(sealer, flight), NOW)
+    answer = sealer.hear(verifier.ask(0), 0)
+    for byte in range(4, 25):  # nonce, session, key, MAC
+        wrong = answer.copy()
+        wrong["data"][0, byte] ^= 1 << (byte % 8)
+        before = verifier.n_trials
+        verifier.feed(wrong, NOW)
+        assert verifier.n_trials - before <= 1
+        assert verifier._known[Node("Actuator", 3)].session < 0
+    verifier.feed(answer, NOW)
+    assert np.array_equal(judged(verifier, sealed(sealer, flight))[0], flight)
+
+
 def test_challenges_make_a_node_begin_a_session_once_a_second_at_most(codec, sealer, flight):
     sealed(sealer, flight)
     stranger = Verifier(codec, OTHER)
