@@ -334,7 +334,7 @@ def test_a_node_that_has_lost_its_sessions_is_refused_and_named(codec, sealer, v
 
 
 def test_an_answer_to_a_challenge_must_be_the_node_s_own(codec, sealer, flight):
-    """Everybody on the bus sees the nonce: an answer with anything in it changed is not believed, the genuine one is."""
+    """Everybody on the bus sees the nonce: one with anything changed in it is not believed, the genuine one is."""
     verifier = Verifier(codec, RING)
     verifier.feed(sealed(sealer, flight), NOW)
     answer = sealer.hear(verifier.ask(0), 0)
