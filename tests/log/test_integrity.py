@@ -160,6 +160,18 @@ def test_times_of_chunks_do_not_hide_messages_from_a_time_range(log):
             assert read.said, bit
 
 
+def test_an_index_that_is_not_that_of_its_chunk_is_said(log):
+    """Without a summary as well: it tells what a damaged chunk has held."""
+    data, _ = log
+    whole = Read(data)
+    indexes = [at for at in _boundaries(data) if at < len(data) and data[at] == Opcode.MESSAGE_INDEX]
+    bits = [8 * (at + RECORD.size + byte) + 3 for at in indexes for byte in (0, 7, 20)]  # channel, time, offset
+    for bit, changed in _flipped(data, bits):
+        read = Read(changed)
+        assert read.messages == whole.messages, bit
+        assert read.said, bit
+
+
 def test_cut_at_every_record_boundary_and_beside_it(log):
     data, _ = log
     whole = Read(data)
