@@ -47,6 +47,7 @@ CHANNELS = {
     "force": Channel("N", "force on a linear axis"),
     "torque": Channel("N m", "torque on a rotary axis"),
     "theta_ref": Channel("rad", "commanded angle of an axis"),
+    "theta_n": Channel("rad", "angle of the neighbouring axis"),
     "q_ref": Channel("m", "commanded position of a linear axis"),
     "duty": Channel("1", "duty cycle of the drive, -1 to 1 of its supply"),
     "enabled": Channel("1", "1 where the drive acts, 0 where it is off"),

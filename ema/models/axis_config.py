@@ -62,6 +62,9 @@ class Axis(Settings):
         description="side of the gear whose position, speed and inertia the plant file and records have",
     )
     position_loop: PositionLoop | None = None
+    neighbour: Literal["inner", "outer"] | None = Field(
+        default=None, description="where the axis of the channel theta_n is: before this one, or on its link"
+    )
     R: float | None = quantity("ohm", "resistance seen by the drive voltage", None, ge=0, le=1e4)
     L: float | None = quantity("H", "inductance seen by the drive voltage", None, ge=0, le=10)
     V_dc: float | None = quantity("V", "supply without load, for which u_q is commanded", None, gt=0, le=1e5)

@@ -119,6 +119,14 @@ def test_a_drive_that_changes_faster_than_its_samples_is_refused_and_told_what_w
         AxisPlant(RotaryAxis.model_validate(MOTOR), [motor(160, lambda t: np.where((t % 1.0) < 3e-4, 2.0, 0.0))])
 
 
+def test_an_axis_that_rests_before_a_step_is_no_clipped_sensor():
+    record = motor(160, lambda t: np.where(t < 1.0, 0.0, 0.25))
+    (cycle,) = record.cycles
+    rests = cycle["t"] < 1.0
+    speed = np.where(rests, 0.0, np.abs(cycle["w_m"]))
+    assert AxisPlant(RotaryAxis.model_validate(MOTOR), [changed(record, w_m=speed)]).windows
+
+
 @pytest.mark.parametrize("volts", [lambda t: 0.25 * np.floor(2.0 * t), lambda t: np.sin(2 * np.pi * 3.0 * t)])
 def test_steps_and_slow_sines_are_taken(volts):
     assert AxisPlant(RotaryAxis.model_validate(MOTOR), [motor(160, volts)]).windows

@@ -10,6 +10,7 @@ What the laws explain of the drive's torque is told whatever the free runs say.
 `smooth`       local polynomials, and test functions, on irregular time stamps
 `rows`         the balance integrated against test functions, in blocks, with its noise
 `law`, `laws`  what may act: columns of the regression with their names, units and sentences
+`links`        the law of a neighbouring axis
 `regression`   least squares with held-out blocks and intervals that blocks agree on
 `attenuation`  errors in the regressors: what noise takes from each coefficient, undone
 `choice`       which laws the records need, and what cannot be told from each

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +26,7 @@ CLEAR = 3.0  # deviations over blocks by which a law must foretell held-out bloc
 MATTERS = 0.1  # share of what is left that a law must take
 LEAST = 3e-4  # share of the drive's torque in power that a law must take
 SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
+N_WIDTHS = 3  # rounds
 N_DRAWS = 400  # of blocks, to see how often a law wins
 
 
@@ -90,17 +91,32 @@ def balance(plant: AxisPlant) -> Balance | None:
     found = rows(plant, recorded)
     if found is None:
         return None
-    first = fitted(found, plain, [])
-    inertia = float(first.coefficients[0]) if "inertia" in first.base else p.inertia
-    widths = half_widths(recorded, abs(inertia), float(np.sqrt(np.mean(found.drive**2))))
-    found = rows(plant, recorded, widths) or found
-    every = list(laws(found.motion, linear=isinstance(p, LinearAxis)))
-    return chosen(found, plain, every, lambda model: attenuation(plant, recorded, widths, plain, model))
+    linear = isinstance(p, LinearAxis)
+    size = float(np.sqrt(np.mean(found.drive**2)))
+    answer, widths = None, None
+    for _ in range(N_WIDTHS):  # how wide test functions must be depends on what stands beside the acceleration
+        first = answer.model if answer is not None else fitted(found, plain, [])
+        wider = half_widths(recorded, _heaviest(first, p.inertia), size)
+        if widths is not None and all(wider[name] <= widths[name] for name in wider):
+            break
+        widths = wider if widths is None else {name: max(wider[name], widths[name]) for name in wider}
+        found = rows(plant, recorded, widths) or found
+        answer = chosen(found, plain, list(laws(found.motion, linear=linear)))
+    assert answer is not None
+    assert widths is not None
+    return replace(answer, corrected=attenuation(plant, recorded, widths, plain, answer.model))
 
 
-def chosen(
-    found: Rows, plain: Plain, every: Sequence[Law], errors_in_regressors: Callable[[Regression], Corrected]
-) -> Balance:
+def _heaviest(model: Regression, inertia: float) -> float:
+    """The largest coefficient of an acceleration, of the fit or the plant file. [kg m² or kg]"""
+    found = [inertia, *(model.coefficients[:1].tolist() if "inertia" in model.base else [])]
+    for law in model.laws:
+        if law.name == "linked_axis":
+            found += model.coefficients[model.part(law)][:2].tolist()
+    return float(np.max(np.abs(found)))
+
+
+def chosen(found: Rows, plain: Plain, every: Sequence[Law]) -> Balance:
     """Forward and backward selection."""
     n = int(found.whole.sum())
     drive = float(np.var(found.drive[found.whole]))
@@ -116,7 +132,7 @@ def chosen(
         model = fewer
     terms = tuple(_term(found, plain, model, law, every) for law in model.laws)
     return Balance(
-        model, errors_in_regressors(model), plain, terms, drive,
+        model, Corrected(model.coefficients, model.covariance()), plain, terms, drive,
         float(np.mean((found.y - plain.inertia * found.alpha)[found.whole] ** 2)),
         base.loss / n, model.loss / n, float(np.mean(found.sigma[found.whole] ** 2)),
     )  # fmt: skip
@@ -143,7 +159,7 @@ def _trials(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) 
     return [fitted(found, plain, [*model.laws, _best(found, model, own)]) for own in members.values()]
 
 
-HOLDS = {"spring": ("constant",)}  # a spring has its own zero
+HOLDS = {"spring": ("constant",), "links": ("pendulum",)}  # a spring has its own zero
 
 
 def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
@@ -164,7 +180,8 @@ def _is_needed(new: Regression, old: Regression, whole: float) -> bool:
     """Clearly better over blocks, by a share of what is left and of the drive's torque that matters."""
     d = old.losses - new.losses
     gain = float(d.sum())
-    clear = gain > CLEAR * float(np.sqrt(len(d)) * np.std(d))
+    votes = d / (old.losses + float(np.mean(old.losses)))  # no block may outvote all others
+    clear = float(votes.sum()) > CLEAR * float(np.sqrt(len(d)) * np.std(votes))
     return clear and gain > MATTERS * old.loss and gain > LEAST * whole
 
 

@@ -25,7 +25,7 @@ class Course:
     `drive` is the channel that drives, `current` the measured current beside a driving voltage; `position` or `speed`
     is None where it was not recorded. `noise` is the rms of each by channel name. A `static` course holds readings at
     rest, each approached in `direction`. `late`: samples by which the drive acts later than its channel says (one that
-    is held from sample to sample: half a sample).
+    is held from sample to sample: half a sample). `other`: angle of a neighbouring axis.
     """
 
     record: str
@@ -40,6 +40,7 @@ class Course:
     static: bool = False
     direction: Array | None = None
     late: float = 0.0
+    other: Array | None = None
 
     @property
     def period(self) -> float:
@@ -60,6 +61,7 @@ class Course:
             position=more(self.position, "position"),
             speed=more(self.speed, "speed"),
             current=more(self.current, "current"),
+            other=more(self.other, "position"),
         )
 
 
@@ -95,7 +97,9 @@ def _moving(b: Bench, cycle: Cycle, every: int, late: float) -> Course:
     names = {"drive": who.drive, "position": who.position, "speed": who.speed, "current": current}
     noise = {role: b.noise[name].sigma / every**0.5 for role, name in names.items() if name in b.noise}
     dT = float(np.mean(cycle["temp_w"])) - T_REFERENCE if "temp_w" in cycle else 0.0
-    return Course(b.name, b, t, drive, of(who.position), of(who.speed), of(current), dT, noise, late=late)
+    return Course(
+        b.name, b, t, drive, of(who.position), of(who.speed), of(current), dT, noise, late=late, other=of("theta_n")
+    )
 
 
 def _static(b: Bench) -> list[Course]:

@@ -14,6 +14,7 @@ import numpy as np
 from ema.core.records import Array
 
 from .law import Acting, Columns, Law, Values, one
+from .links import links
 from .rows import Motion
 
 N_SPEEDS, N_PLACES, N_ORDERS = 14, 12, 320  # members of a family
@@ -58,6 +59,8 @@ def laws(m: Motion, *, linear: bool) -> Iterator[Law]:
         yield from _by_time(m, u)
         if min(float(np.mean(m.drive > 0.0)), float(np.mean(m.drive < 0.0))) > SEEN_BOTH:
             yield _unequal_drive()
+    if m.neighbour:
+        yield links(m)
     yield from _by_load(u)
     if m.has_position and float(np.ptp(m.theta)) > 0.0:
         yield from _by_position(m, u, moves=moves, linear=linear)

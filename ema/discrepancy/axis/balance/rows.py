@@ -7,7 +7,7 @@ No derivative of the data is taken for laws that are linear in the motion; those
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,6 +44,7 @@ class Motion:
 
     `drive` is the drive's torque; `known` what is left of it to accelerate the axis, by the plant file.
     `direction` is ±1 or, where the axis may rest, 0. `has_position` is False where the position was integrated.
+    `other` is angle, speed and acceleration of a neighbouring axis, which is the `neighbour` "inner" or "outer" one.
     """
 
     t: Array
@@ -55,6 +56,8 @@ class Motion:
     direction: Array
     has_position: bool
     static: NDArray[np.bool_]
+    other: tuple[Array, Array, Array] = (np.empty(0), np.empty(0), np.empty(0))
+    neighbour: str = ""
 
 
 @dataclass(frozen=True)
@@ -231,7 +234,11 @@ def _motion(plant: AxisPlant, model: axis.Model, c: Course, half: float) -> Moti
     dT = np.full(len(w), c.dT)
     is_force = c.bench.roles.kind == "force"
     known = axis.torque_along(model, theta, w, i, c.t, dT, force=is_force)
-    return Motion(c.t, theta, w, a, drive, known, direction, c.position is not None, np.zeros(len(w), bool))
+    motion = Motion(c.t, theta, w, a, drive, known, direction, c.position is not None, np.zeros(len(w), bool))
+    if c.other is None or plant.plant.neighbour is None:
+        return motion
+    psi, v, accelerates = local_polynomial(c.t, c.other, n_half, 3)[:3]
+    return replace(motion, other=(psi, v, accelerates), neighbour=plant.plant.neighbour)
 
 
 def _at_rest(plant: AxisPlant, model: axis.Model, c: Course) -> Motion:
@@ -283,4 +290,8 @@ def _joined(motions: list[Motion]) -> Motion:
         return np.concatenate([getattr(m, name) for m in motions])
 
     columns = (of("t"), of("theta"), of("w"), of("a"), of("drive"), of("known"), of("direction"))
-    return Motion(*columns, all(m.has_position for m in motions), of("static").astype(bool))
+    motion = Motion(*columns, all(m.has_position for m in motions), of("static").astype(bool))
+    if not all(m.neighbour for m in motions):
+        return motion
+    psi, v, a = (np.concatenate([m.other[k] for m in motions]) for k in range(3))
+    return replace(motion, other=(psi, v, a), neighbour=motions[0].neighbour)
