@@ -143,7 +143,7 @@ def _not_clipped(record: Record, names: tuple[str, ...], position: str) -> None:
         x = np.concatenate([cycle[name] for cycle in record])
         if len(np.unique(x)) < 5:  # a commanded step or constant is no clipping
             continue
-        for limit in {x.max(), x.min()} - {0.0}:  # at zero it rests
+        for limit in (limit for limit in (x.max(), x.min()) if limit != 0.0):  # at zero it rests
             share = float(np.mean(x == limit))
             longest = _longest_run(x == limit)
             if share > 0.03 and longest >= 5 and (name != position or _is_cut_off(x, limit)):
