@@ -6,6 +6,9 @@ from pathlib import Path
 
 import click
 
+# python-can and pint load these, and pandas with them, where they are installed: 80 MB that a monitor never uses.
+UNUSED = ("asammdf", "dask")
+
 
 @click.command(short_help="The monitor: bus → fault estimates on the bus and in the log.")
 @click.option("--config", "config_path", required=True, type=click.Path(path_type=Path), help="daemon YAML")
@@ -25,8 +28,7 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
     import signal
     import sys
 
-    # python-can and pint load these, and pandas with them, where they are installed: 80 MB that a monitor never uses.
-    sys.modules.update(dict.fromkeys(("asammdf", "dask")))  # type: ignore[arg-type]
+    sys.modules.update(dict.fromkeys(UNUSED))  # type: ignore[arg-type]
 
     from ema.bus import interface
     from ema.core.errors import EmaError, Failure, OccupiedError

@@ -63,7 +63,9 @@ def test_a_service_from_ready_to_stopped(write_config, manager, bus, frames, tmp
         estimates = [m.content for m in log.messages(lambda topic: topic == "/estimate/0/linear")]
         assert [e["cycle"] for e in estimates] == [0]
         assert estimates[0]["status"] == "valid"
-        assert set(log.attachments()) == {"ema.dbc", "daemon.yaml", "alarms.yaml", "manifest.json"}
+        assert set(log.attachments()) == {
+            *("ema.dbc", "daemon.yaml", "alarms.yaml", "manifest.json", "identification.json")
+        }
 
 
 def test_a_service_manager_that_does_not_listen_is_not_waited_for(tmp_path, monkeypatch):

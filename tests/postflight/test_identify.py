@@ -195,7 +195,7 @@ def test_raw_logs_of_other_tools_are_identified_as_the_daemon_did(recorded, coar
 def test_without_asammdf_an_mf4_log_is_refused_in_one_line(recorded, tmp_path, monkeypatch):
     monkeypatch.setattr("can.io.mf4.asammdf", None)
     (tmp_path / "x.mf4").write_bytes(b"MDF     4.10")
-    with pytest.raises(LogError, match=r"x\.mf4: needs a package that is not installed .*ema-monitor\[logs\]"):
+    with pytest.raises(LogError, match=r"x\.mf4: needs a package that is not installed .*ema-monitor\[analyse\]"):
         _run(tmp_path / "x.mf4", "--identify")
     with pytest.raises(LogError, match=r"y\.mf4: .*asammdf") as error:
         CliRunner().invoke(export, [str(recorded), "--out", str(tmp_path / "y.mf4")], catch_exceptions=False)
