@@ -292,7 +292,7 @@ def _array(path: Path, name: str, sha256: str) -> np.ndarray:
 def _signer(path: Path, content: bytes, trusted: Sequence[TrustedKey]) -> str:
     """Fingerprint of the key the manifest is signed with; BundleError where that is none of the trusted ones."""
     try:
-        signature = (path / SIGNATURE).read_text(encoding="ascii")
+        signature = require_file(path / SIGNATURE, 1 << 12).read_text(encoding="ascii")
     except FileNotFoundError as error:
         raise BundleError(f"{path}: is not signed, and the configuration trusts signed bundles only") from error
     except UnicodeDecodeError as error:

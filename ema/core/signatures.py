@@ -18,6 +18,7 @@ from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 
 from .errors import ConfigError
+from .files import require_file
 
 _LARGEST = 1 << 16  # a key file [B]
 
@@ -83,7 +84,7 @@ def signer(content: bytes, signature: str, trusted: Iterable[TrustedKey]) -> Tru
 def _read(path: Path) -> tuple[bytes, int]:
     """Content and mode of a file."""
     try:
-        with path.open("rb") as file:
+        with require_file(path).open("rb") as file:
             return file.read(_LARGEST), os.fstat(file.fileno()).st_mode
     except OSError as error:
         raise ConfigError(f"key {path}: cannot be read ({error.strerror})") from error

@@ -1,5 +1,6 @@
 """Where trusted keys are configured, only what one of them has signed is taken, to the last bit."""
 
+import os
 import shutil
 import subprocess
 
@@ -139,6 +140,13 @@ def test_a_bad_key_file_is_refused_in_one_line(tmp_path, load, text, mode, said)
     with pytest.raises(ConfigError, match=said) as caught:
         load(path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("load", [load_private, load_trusted])
+def test_a_key_that_is_a_pipe_is_refused_at_once(tmp_path, load):
+    os.mkfifo(tmp_path / "key.pem", 0o600)
+    with pytest.raises(ConfigError, match="it is a pipe"):
+        load(tmp_path / "key.pem")
 
 
 def test_another_kind_of_key_is_refused(tmp_path):
