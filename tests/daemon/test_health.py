@@ -123,11 +123,12 @@ def test_a_slower_identifier_has_its_own_period(world):
 
 
 def test_estimates_that_cannot_be_used_are_none(world):
-    world.methods = []
+    world.methods = ["lf2"]
     for _ in range(20):
         world.health.estimated(identified(status=Status.INVALID), 0.01)
         world.go(0.5)
     assert world.beat()[0] is Lapse.NO_ESTIMATE
+    assert world.health.supervisor.gravest.subject == "linear"
 
 
 @pytest.mark.parametrize("reason", [Reason.CURRENT_A, Reason.CURRENT_SUM, Reason.ROTOR_ANGLE])

@@ -154,11 +154,17 @@ def test_a_user_position_that_jumps_is_named(cycle, judge):
     assert judge(i, motion) == Reason.USER_POSITION
 
 
-def test_a_stop_is_no_jump(cycle, judge):
-    """Against its end stop a rotor loses all its speed in a moment, and keeps none."""
+def test_currents_at_the_end_of_their_converters_range_need_not_sum_to_zero(cycle, judge):
+    i, motion = copies(cycle)
+    assert judge(np.clip(6 * i, -30, 29.999), motion) == Reason(0)
+
+
+@pytest.mark.parametrize("last", [0.0, 0.2])
+def test_a_stop_is_no_jump(cycle, judge, last):
+    """Against its end stop a rotor loses all its speed in a moment, or in two, and keeps none."""
     i, motion = copies(cycle)
     steps = np.full(N_MOTION - 1, 0.4)
-    steps[250:] = 0.0
+    steps[250], steps[251:] = last, 0.0
     motion["theta_m"] = np.concatenate([[0.0], np.cumsum(steps)]) % (2 * np.pi)
     motion["theta_u"] = np.concatenate([[0.0], np.cumsum(steps)]) / 500
     assert judge(i, motion) == Reason(0)
