@@ -130,3 +130,23 @@ def test_an_axis_that_rests_before_a_step_is_no_clipped_sensor():
 @pytest.mark.parametrize("volts", [lambda t: 0.25 * np.floor(2.0 * t), lambda t: np.sin(2 * np.pi * 3.0 * t)])
 def test_steps_and_slow_sines_are_taken(volts):
     assert AxisPlant(RotaryAxis.model_validate(MOTOR), [motor(160, volts)]).windows
+
+
+def test_a_constant_voltage_shows_no_law_of_friction():
+    """The torque by such a voltage is a straight line over speed, whatever the axis does."""
+    plant = AxisPlant(RotaryAxis.model_validate(MOTOR), [motor(160, lambda t: np.where(t < 1.0, 0.0, 0.25))])
+    assert plant.balance is None
+
+
+def test_at_one_speed_each_way_drag_is_no_drag_by_direction(positioner):
+    bench = positioner.Table()
+    record = positioner.table(bench, 1)
+    (cycle,) = record.cycles
+    v = np.gradient(cycle["q"], cycle["t"])
+    steady = np.abs(np.abs(v) - 0.12) < 0.004
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], steady.astype(int), [0])))).reshape(-1, 2)
+    parts = [cycle.rows(int(a), int(b)) for a, b in edges if b - a > 300]
+    one_speed = Record(tuple(Cycle(k, part.channels) for k, part in enumerate(parts)))
+    plant = AxisPlant(LinearAxis.model_validate(positioner.table_plant(bench)), [one_speed])
+    found = plant.balance
+    assert found is None or "viscous_by_direction" not in [term.law.name for term in found.terms]

@@ -12,8 +12,8 @@ from ema.core.records import Array
 from ema.models.axis_config import LinearAxis
 
 from .attenuation import Corrected, attenuation
-from .course import courses
-from .law import Law
+from .course import Course, courses
+from .law import Acting, Law
 from .laws import LINES, laws
 from .regression import Plain, Regression, fitted
 from .rows import Rows, half_widths, rows
@@ -26,6 +26,8 @@ CLEAR = 3.0  # deviations over blocks by which a law must foretell held-out bloc
 MATTERS = 0.1  # share of what is left that a law must take
 LEAST = 3e-4  # share of the drive's torque in power that a law must take
 SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
+CONSTANT = 0.02  # share by which a voltage must change to drive by more than its value
+APART = 0.05  # of a law's size that must stand out of what inertia, dry friction and drag do
 N_WIDTHS = 3  # rounds
 N_DRAWS = 400  # of blocks, to see how often a law wins
 
@@ -92,6 +94,8 @@ def balance(plant: AxisPlant) -> Balance | None:
     if found is None:
         return None
     linear = isinstance(p, LinearAxis)
+    if _is_given(plant, recorded, found):
+        return None
     size = float(np.sqrt(np.mean(found.drive**2)))
     answer, widths = None, None
     for _ in range(N_WIDTHS):  # how wide test functions must be depends on what stands beside the acceleration
@@ -101,10 +105,35 @@ def balance(plant: AxisPlant) -> Balance | None:
             break
         widths = wider if widths is None else {name: max(wider[name], widths[name]) for name in wider}
         found = rows(plant, recorded, widths) or found
-        answer = chosen(found, plain, list(laws(found.motion, linear=linear)))
+        answer = chosen(found, plain, _shown(found, list(laws(found.motion, linear=linear))))
     assert answer is not None
     assert widths is not None
     return replace(answer, corrected=attenuation(plant, recorded, widths, plain, answer.model))
+
+
+def _is_given(plant: AxisPlant, recorded: Sequence[Course], found: Rows) -> bool:
+    """Whether the drive's torque is no measurement: by a constant voltage it is a function of speed, whatever acts."""
+    if plant.plant.drive != "voltage" or any(c.current is not None for c in recorded):
+        return False
+    u = found.integrate @ np.concatenate([c.drive for c in recorded])
+    return float(np.ptp(np.abs(u))) < CONSTANT * float(np.abs(u).max(initial=0.0))
+
+
+def _shown(found: Rows, every: Sequence[Law]) -> list[Law]:
+    """Laws that the motions can show beside inertia, dry friction and drag."""
+    m = found.motion
+    base = np.column_stack([found.alpha, found.integrate @ m.direction, found.integrate @ m.w])
+    size = np.linalg.norm(base, axis=0)
+    q, _ = np.linalg.qr(base[:, size > 0.0] / size[size > 0.0])
+    out = []
+    for law in every:
+        if law.needs_acting:
+            out.append(law)
+            continue
+        A = np.column_stack(found.of(law, law.columns(m, Acting(m.drive, m.drive, m.drive))))
+        if float(np.linalg.norm(A - q @ (q.T @ A))) > APART * float(np.linalg.norm(A)):
+            out.append(law)
+    return out
 
 
 def _heaviest(model: Regression, inertia: float) -> float:
