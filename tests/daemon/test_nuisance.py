@@ -13,8 +13,8 @@ from ema_daemon.wire import fingerprint
 from ema_daemon.worker import Worker
 from ema_postflight.live import Live
 from ema_postflight.page import page
+from ema_postflight.picture import draw
 from ema_postflight.report_settings import ReportSettings
-from ema_postflight.watch import draw
 
 from ema.bus import codec as codecs
 from ema.core import config, resources
