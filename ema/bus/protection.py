@@ -19,7 +19,7 @@ __all__ = ["GOOD", "Check", "Counts", "Receiver", "Sender", "Stream", "StreamSta
 
 _ROW = FRAME_DTYPE.itemsize
 _DATA = FRAME_DTYPE.fields["data"][1]  # type: ignore[index]
-_RARE = 0.05  # a stream whose frames come no more often than this can be looked at closely [s]
+_SELDOM = 0.05  # what has no period is sent no more often than this [s]
 _FORMAT = int(FrameFlag.EXTENDED | FrameFlag.FD)
 _REFUSED = int(FrameFlag.REFUSED)
 _FORMAT_MASK = _FORMAT | _REFUSED | int(FrameFlag.REMOTE | FrameFlag.ERROR)
@@ -116,7 +116,7 @@ class Receiver:
                 if t_ns - self._last_heard(frame_id) > RESTART_NS:
                     self._begin_anew(self._siblings(frame_id))
                 n_restarts, expected, last_ns = stream.n_restarts, stream.expected, stream.last_ns
-                check = checks[n] = stream.place(number, t_ns, raw[begin] | raw[begin + 1] << 8)
+                check = checks[n] = stream.place(number, t_ns)
                 if stream.n_restarts > n_restarts:
                     others = [other for other in self._siblings(frame_id) if other is not stream]
                     self._explain(stream, others, number, ahead(number, expected), t_ns, last_ns)
@@ -178,7 +178,7 @@ class Receiver:
             return None
         if identifiers.actuator(frame_id) not in self._actuators:
             return None
-        data_id, period_ns = identifiers.data_id(frame_id), round((message.period or _RARE) * 1e9)
-        stream = Stream(data_id, message.length, round(message.timeout * 1e9), period_ns, period_ns >= _RARE * 1e9)
+        data_id, period_ns = identifiers.data_id(frame_id), round((message.period or _SELDOM) * 1e9)
+        stream = Stream(data_id, message.length, round(message.timeout * 1e9), period_ns)
         self.streams[frame_id] = stream
         return stream

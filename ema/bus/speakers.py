@@ -40,36 +40,22 @@ class Crossings:
 
 @dataclass(slots=True)
 class Speakers:
-    """The evidence in one stream.
+    """The evidence in the numbers of one stream; contents are compared where frames are kept, in `ema.monitor`.
 
     Attributes
     ----------
-    n_contents : int
-        Of so many frames the contents are remembered (their CRC): of streams that are seldom heard. Those of the others
-        are compared where their frames are kept, in `ema.monitor`.
     window : int
         A frame so far ahead of what was expected goes on with its sequence.
     """
 
-    n_contents: int
     window: int
     two: bool = False  # whether the last frame has shown two; whoever asks takes it back
     _crossings: Crossings = field(default_factory=Crossings)
     _left: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=_N_LEFT))  # next number, when
-    _contents: dict[int, int] = field(default_factory=dict)  # CRC by number, oldest first
 
-    def go_on(self, sequence: int, crc: int, t_ns: int) -> None:
+    def go_on(self, t_ns: int) -> None:
         """A good frame."""
         self.two |= self._crossings.go_on(t_ns)
-        if self.n_contents:
-            self._contents.pop(sequence, None)
-            self._contents[sequence] = crc
-            if len(self._contents) > self.n_contents:
-                del self._contents[next(iter(self._contents))]
-
-    def repeat(self, sequence: int, crc: int) -> None:
-        """A frame with a number that was there before."""
-        self._crossings.strange |= self._contents.get(sequence, crc) != crc
 
     def stray(self) -> None:
         """A frame far off the sequence, which is not followed."""
@@ -78,7 +64,6 @@ class Speakers:
     def leave(self, expected: int, t_ns: int) -> None:
         """A sequence is not followed any more."""
         self._left.append((expected, t_ns))
-        self._contents.clear()
         self._crossings.strange = False
 
     def come(self, sequence: int, t_ns: int) -> None:

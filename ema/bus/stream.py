@@ -64,7 +64,6 @@ class Stream:
     length: int
     timeout_ns: int
     period_ns: int = 1_000_000  # of its frames while they are sent, at least
-    is_rare: bool = False  # few frames a second: each is looked at closely
     machine: StateMachine = field(default_factory=StateMachine)
     counts: Counts = field(default_factory=Counts)
     expected: int = -1  # next sequence number; -1 before the first frame
@@ -79,7 +78,7 @@ class Stream:
     speakers: Speakers = field(init=False)
 
     def __post_init__(self) -> None:
-        self.speakers = Speakers(MAX_AHEAD if self.is_rare else 0, MAX_AHEAD)
+        self.speakers = Speakers(MAX_AHEAD)
 
     def refuse(self, check: Check) -> Check:
         """Count a frame whose length or CRC is wrong, or that is not authentic: the last says nothing of the stream."""
@@ -93,14 +92,12 @@ class Stream:
         self._update(Result.ERROR)
         return check
 
-    def place(self, sequence: int, t_ns: int, crc: int) -> Check:
+    def place(self, sequence: int, t_ns: int) -> Check:
         """Judge a frame with correct CRC by its sequence number; the caller keeps `last_ns`."""
         check = self._judge(sequence, t_ns)
         if check <= GOOD:
-            self.speakers.go_on(sequence, crc, t_ns)
-        elif check is Check.REPEATED:
-            self.speakers.repeat(sequence, crc)
-        else:
+            self.speakers.go_on(t_ns)
+        elif check is Check.WRONG_COUNTER:
             self.speakers.stray()
         self._update(Result.OK if check <= GOOD else Result.OTHER)
         return check
@@ -168,4 +165,4 @@ class Stream:
 
     def _update(self, result: Result) -> None:
         self.machine.update(result)
-        self.steady = self.machine.steady and not self.is_rare
+        self.steady = self.machine.steady

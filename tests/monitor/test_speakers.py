@@ -21,16 +21,16 @@ def send(fly):
     """Frames of an actuator from a number of cycles, whose sequences begin at given numbers; times in [s]."""
     made = {}
 
-    def make(faults, n_cycles, begin, phases=None, first_cycle=0):
-        key = repr((faults, n_cycles))
+    def make(faults, n_cycles, begin, phases=None, period=PERIOD):
+        key = repr((faults, n_cycles, period))
         if key not in made:
-            made[key] = fly(n_cycles=n_cycles, seed=5, period=PERIOD, actuators=[{"faults": faults}])
+            made[key] = fly(n_cycles=n_cycles, seed=5, period=period, actuators=[{"faults": faults}])
         traffic, parts = Traffic(CODEC, [0]), []
         for name, phase in (phases or {}).items():
             traffic._sender.skip(CODEC.messages[name].frame_id, phase)
         for cycle, _ in made[key]:
-            frames, due = traffic.frames(cycle, PERIOD)
-            seconds = begin + cycle.number * PERIOD + due
+            frames, due = traffic.frames(cycle, period)
+            seconds = begin + cycle.number * period + due
             frames["t_ns"] = 1_700_000_000_000_000_000 + np.round(1e9 * seconds).astype(np.int64)
             parts.append(frames)
         return np.concatenate(parts)
@@ -111,6 +111,16 @@ def test_at_any_moment_with_any_phase(bench, send):
         assert_never_mixed(estimates, alone(bench, first, second))
         assert all(o.estimate.status >= Status.INVALID for o in speaking), (start, phases)
         assert events[:1] == ["two_speakers"], (start, phases)
+
+
+def test_one_whose_cycles_lie_in_the_pauses_and_that_looks_like_a_restart(bench, send):
+    """It counts from 0, as after a restart; but the genuine one's supply voltage goes on meanwhile."""
+    first = send(NOTHING, 4, 0.0, dict.fromkeys((*RARE, "PhaseCurrents", "Motion"), 1000), period=2.0)
+    estimates, events = answers(bench, merged(first, send(FAULTY, 2, 2.7, period=2.0)))
+    ends = {round(o.t_ns / 1e9 - 1_700_000_000, 1): o.estimate for o in estimates}
+    assert [t for t in ends if t < 7] == pytest.approx([0.5, 2.5, 3.2, 4.5, 5.2, 6.5])
+    assert [e.status >= Status.INVALID for t, e in ends.items() if t < 6] == [False, False, True, True, True]
+    assert events[0] == "two_speakers"
 
 
 def test_one_that_sends_each_frame_just_before_the_genuine_one(bench, send):
