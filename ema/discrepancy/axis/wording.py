@@ -11,7 +11,7 @@ from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
 from .agreeing import together
-from .balance.as_effects import point
+from .balance.as_effects import effects, point
 from .balance.telling import sentences, told
 from .closed_loop import closed_loop
 from .dropped import dropped
@@ -66,8 +66,11 @@ def _balance(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
     found, linear = plant.balance, isinstance(plant.plant, LinearAxis)
     if found is None:
         return {}
+    out = told(found, linear=linear)
+    if not all(effects(found, term) for term in found.terms):
+        return out  # a law that the axis model does not simulate: free runs say nothing of it
     run = plant.errors(point(found, linear=linear), range(len(plant.blocks)))
-    out = {**told(found, linear=linear), "free_run": {"err": run.error, "noise_floor": run.noise_floor}}
+    out["free_run"] = {"err": run.error, "noise_floor": run.noise_floor}
     nominal = closed_loop(plant, dict(zip(outcome.base, outcome.k_before, strict=True)))
     extended = closed_loop(plant, point(found, linear=linear))
     if nominal is not None and extended is not None:
