@@ -59,8 +59,8 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     }
     log_settings = LogSettings(**settings.log.model_dump(exclude={"directory"}))
     with ExitStack() as stack:
-        log = stack.enter_context(LogWriter(settings.log.directory, attachments, log_settings))
         port = stack.enter_context(open_bus(settings.bus, [*_heard(codec), *presence.filters()], role="Monitor"))
+        log = stack.enter_context(LogWriter(settings.log.directory, attachments, log_settings))
         state = StateFile(Path(settings.alarms.state or Path(settings.log.directory) / "alarms.json"))
         stack.enter_context(state)
         turn = Turn(presence, port.name, watch.listen, settings.standby)

@@ -81,6 +81,19 @@ def test_the_log_folder_is_deleted(attack, tell):
          "what the folder held")  # fmt: skip
 
 
+def test_signals_that_end_other_programs(attack, tell):
+    """Each is decided: reread the configuration, cut the log, tell the state, or nothing."""
+    daemon = attack()
+    daemon.until_state(ServiceState.RUNNING)
+    numbers = [signal.SIGHUP, signal.SIGUSR1, signal.SIGUSR2, signal.SIGQUIT, signal.SIGALRM, signal.SIGPIPE]
+    for number in numbers:
+        daemon.signal(number)
+    assert set(statuses(daemon.estimates(2))) == {Status.VALID}
+    assert daemon.stop() == 0
+    names = ", ".join(number.name for number in numbers)
+    tell(names, len(numbers), "estimates go on; what each is for: [the service](daemon.md)", "nothing")
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_ended_in_mid_cycle(attack, tell, number):
     daemon = attack()
