@@ -105,7 +105,7 @@ def balance(plant: AxisPlant) -> Balance | None:
             break
         widths = wider if widths is None else {name: max(wider[name], widths[name]) for name in wider}
         found = rows(plant, recorded, widths) or found
-        answer = chosen(found, plain, _shown(found, list(laws(found.motion, linear=linear))))
+        answer = chosen(found, plain, shown_by(found, list(laws(found.motion, linear=linear))))
     assert answer is not None
     assert widths is not None
     return replace(answer, corrected=attenuation(plant, recorded, widths, plain, answer.model))
@@ -119,7 +119,7 @@ def _is_given(plant: AxisPlant, recorded: Sequence[Course], found: Rows) -> bool
     return float(np.ptp(np.abs(u))) < CONSTANT * float(np.abs(u).max(initial=0.0))
 
 
-def _shown(found: Rows, every: Sequence[Law]) -> list[Law]:
+def shown_by(found: Rows, every: Sequence[Law]) -> list[Law]:
     """Laws that the motions can show beside inertia, dry friction and drag."""
     m = found.motion
     base = np.column_stack([found.alpha, found.integrate @ m.direction, found.integrate @ m.w])
@@ -131,7 +131,8 @@ def _shown(found: Rows, every: Sequence[Law]) -> list[Law]:
             out.append(law)
             continue
         A = np.column_stack(found.of(law, law.columns(m, Acting(m.drive, m.drive, m.drive))))
-        if float(np.linalg.norm(A - q @ (q.T @ A))) > APART * float(np.linalg.norm(A)):
+        beside = np.linalg.norm(A - q @ (q.T @ A), axis=0)
+        if bool((beside > APART * np.linalg.norm(A, axis=0)).any()):
             out.append(law)
     return out
 
