@@ -37,6 +37,11 @@ class FoundEffect:
     separated_by: str
     place: Literal["plant", "loop", "recorder"] = "plant"
 
+    @property
+    def of_set(self) -> float:
+        """Confidence that it is this one or one of those that it cannot be told from, which share what is sure."""
+        return min(1.0, self.confidence * (1 + len(self.indistinguishable_from)))
+
 
 @dataclass(frozen=True)
 class Gain:
@@ -172,12 +177,16 @@ SEEN = 1.05  # times the noise, where a rest beside a cause is worth a word
 def _said(effect: FoundEffect) -> str:
     """The effect's sentence with its reservations; those in a set share what is sure of it."""
     others = effect.indistinguishable_from
-    odds = effect.confidence * (1 + len(others))
+    odds = effect.of_set
     text = effect.sentence[0].upper() + effect.sentence[1:]
-    if odds < SURE:
-        text = f"Perhaps, with a confidence of {odds:.0%} only: {effect.sentence}"
     if others:
-        text += f" (or {' or '.join(others)}; told apart by {effect.separated_by})"
+        text = f"One of {1 + len(others)} that fit alike, this record cannot tell which: {effect.sentence}"
+    if odds < SURE:
+        which = "one of these" if others else effect.sentence
+        text = f"Perhaps, with a confidence of {odds:.0%} only: {which}"
+        text += f", {effect.sentence}" if others else ""
+    if others:
+        text += f"; or {' or '.join(others)} (told apart by {effect.separated_by})"
     elif odds < SURE:
         text += f" (to be confirmed by {effect.separated_by})"
     return text + "."

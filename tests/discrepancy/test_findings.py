@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import pytest
+from axe_look import BROWSER, look
 from click.testing import CliRunner
 from ema_postflight.discrepancy import discrepancy
 
 from ema.core import resources
 from ema.core.errors import ConfigError
 from ema.core.version import version
-from ema.discrepancy.findings import Findings, FoundEffect, Gain, graded
+from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity, graded
+from ema.discrepancy.report import write_report
 from ema.effects import registry
 
 GAIN = Gain(0.1, 0.1, 0.1, 0.1, 0.1)
@@ -38,8 +40,10 @@ def test_a_set_is_as_sure_as_its_members_together():
 
     assert said(0.95) == "A spring."
     assert said(0.6) == "Perhaps, with a confidence of 60% only: a spring (to be confirmed by slow motion)."
-    assert said(0.49, "inertia") == "A spring (or inertia; told apart by slow motion)."
-    assert said(0.1, "inertia").startswith("Perhaps, with a confidence of 20% only: a spring (or inertia;")
+    one_of = "One of 2 that fit alike, this record cannot tell which: a spring; or inertia (told apart by slow motion)."
+    assert said(0.49, "inertia") == one_of
+    perhaps = "Perhaps, with a confidence of 20% only: one of these, a spring; or inertia (told apart by slow motion)."
+    assert said(0.1, "inertia") == perhaps
 
 
 def test_what_was_found_before_is_not_overwritten(tmp_path):
@@ -91,3 +95,26 @@ def test_sensors_of_the_loop_and_of_the_recorder_are_different_effects():
     assert places["current_gain"] == places["current_offset"] == places["controller_delay"] == "loop"
     assert places["recorder_gain"] == places["recorder_offset"] == places["recorder_delay"] == "recorder"
     assert places["cogging"] == "plant"
+
+
+@pytest.mark.parametrize(
+    ("others", "headline"), [((), "Explained."), (("inertia",), "Explained, but not by which of a set.")]
+)
+def test_the_report_says_the_set_where_there_is_one(others, headline, tmp_path):
+    effect = FoundEffect(
+        "spring_load",
+        0.49 if others else 0.98,
+        others,
+        {"k": Quantity(1.0, 0.9, 1.1, "N m/rad")},
+        "a spring",
+        "slow motion",
+    )
+    write_report(tmp_path / "report.html", "bench", ["flight.csv"], Findings("explained", [effect], GAIN), [])
+    text = (tmp_path / "report.html").read_text()
+    assert headline in text
+    assert ("0.98 for the set" in text) == bool(others)
+    if BROWSER is not None:
+        for screen in ((1280, 900, False), (390, 844, True)):
+            seen = look(tmp_path / "report.html", *screen)
+            assert seen["found"] == []
+            assert not seen["wide"]
