@@ -148,9 +148,11 @@ def package():
     wait_until_running()
     facts["estimates_after_upgrade"] = wait_for_estimates()
     run("dpkg", "--remove", "ema-monitor")
+    keep("after_removal")
     facts["removed"] = {
         "left": [str(path) for path in (Path("/usr/lib/ema-monitor"), Path("/usr/bin/ema")) if os.path.lexists(path)],
         "state": show("ActiveState")["ActiveState"],
+        "wanted": [str(path) for path in Path("/etc/systemd/system").glob("*.wants/ema-*")],
         "mine": Path(f"/etc/ema/{BUS}.yaml").read_text() == mine,
         "logs": len(list(LOGS.glob("*.mcap"))),
     }

@@ -123,7 +123,13 @@ def test_estimates_go_on(facts, event):
 def test_the_package_runs_its_own_program_and_goes_without_a_trace_of_itself(facts):
     assert facts["package_runs"][1].startswith("/usr/lib/ema-monitor/")
     assert facts["removed"]["left"] == []
-    assert facts["removed"]["state"] in ("inactive", "failed")
+    assert facts["removed"]["wanted"] == []
+
+
+def test_a_removed_package_stopped_its_service_in_order(facts, machine):
+    assert facts["removed"]["state"] == "inactive"
+    with LogReader(segments(machine / "after_removal")[-1]) as log:
+        assert log.unfinished == []
 
 
 def test_a_removed_package_leaves_what_is_the_user_s(facts):
