@@ -8,17 +8,17 @@ commands heard a second before: so late that they are surely in the log before t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ema.core import config
-from ema.core.status import AlarmLevel, AlarmState, Reason, Status
+from ema.core.status import AlarmLevel, AlarmState
 
 from .causes import CAUSES, OF_MONITOR, Kind
 from .change import Change, Measure
 from .command import Action, Command, Heard
-from .judge import Judge
+from .judge import Judge, Judged
 from .point import Point
 from .settings import AlarmSettings, Latching
 
@@ -26,24 +26,6 @@ HEARD_NS = 1_000_000_000  # a command is certain to be in the log before a heart
 VERSION = 1
 _NEVER = Latching(watch=False, alarm=False)  # only faults' own alarms latch: the others are about what is going on
 _Key = tuple[int | None, str]
-
-
-class Judged(NamedTuple):
-    """What alarms need of an estimate; arrays of shape (6,)."""
-
-    t_ns: int
-    actuator: int
-    cycle: int
-    k: np.ndarray
-    sd: np.ndarray
-    status: Status
-    reasons: Reason
-
-    @classmethod
-    def of(cls, out: Any) -> Judged:
-        """Of the monitor's answer (`ema.monitor.Identified`), as it made it: not what became of it on its way out."""
-        e = out.estimate
-        return cls(out.t_ns, out.actuator, out.cycle, e.k, e.sd, e.status, e.reasons)
 
 
 class Alarms:

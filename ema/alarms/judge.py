@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,10 +16,25 @@ from .condition import Condition
 from .settings import AlarmSettings
 from .trend import ROOM, Trend, life
 
-if TYPE_CHECKING:
-    from .alarms import Judged
-
 Condition_ = tuple[str, AlarmLevel, Measure]
+
+
+class Judged(NamedTuple):
+    """What alarms need of an estimate; arrays of shape (6,)."""
+
+    t_ns: int
+    actuator: int
+    cycle: int
+    k: np.ndarray
+    sd: np.ndarray
+    status: Status
+    reasons: Reason
+
+    @classmethod
+    def of(cls, out: Any) -> Judged:
+        """Of the monitor's answer (`ema.monitor.Identified`), as it made it: not what became of it on its way out."""
+        e = out.estimate
+        return cls(out.t_ns, out.actuator, out.cycle, e.k, e.sd, e.status, e.reasons)
 
 
 class Judge:

@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 # A reader of another file kind registers itself under its suffix, for example ".mcap".
 READERS_GROUP = "ema.record_readers"
+TEXT = ".csv"
 
 
 @dataclass(frozen=True)
@@ -138,12 +139,12 @@ def each_once(paths: Iterable[Path]) -> list[Path]:
 
 
 def _reader(suffix: str) -> Callable[[Path, Sidecar | None], Record]:
-    for entry in entry_points(group=READERS_GROUP, name=suffix):
-        reader: Callable[[Path, Sidecar | None], Record] = entry.load()
-        return reader
-    from .csv_records import read_csv
-
-    return read_csv
+    """What reads files of this suffix; tables in text have many, so the rest is read as one."""
+    for name in (suffix, TEXT):
+        for entry in entry_points(group=READERS_GROUP, name=name):
+            reader: Callable[[Path, Sidecar | None], Record] = entry.load()
+            return reader
+    raise RecordError("no reader of records is installed: install the project again ('make env' in a clone)")
 
 
 def require(
