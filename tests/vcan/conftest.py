@@ -15,7 +15,7 @@ import yaml
 from ema.bus import codec
 from ema.bus.port import RECEIVE_BUFFER
 from ema.bus.socketcan import SocketCanPort
-from ema.core.status import Status
+from ema.core.status import Reason, Status
 from ema.log import LogReader
 
 HERE = Path(__file__).parent
@@ -216,9 +216,15 @@ class DaemonProcess:
 
     def estimate(self, cycle):
         """(k as counts on the bus, status) of the linear estimate of a cycle."""
+        k, status, _ = self.estimate_with_reasons(cycle)
+        return k, status
+
+    def estimate_with_reasons(self, cycle):
+        """The same, and its reasons."""
         values = self.next("EstimateLinear", lambda values: values["cycle"] == cycle)
         scale = self._codec.messages["EstimateLinear"].fields["k"].scale
-        return np.round(values["k"] / scale).astype(int).tolist(), Status(int(values["status"]))
+        k = np.round(values["k"] / scale).astype(int).tolist()
+        return k, Status(int(values["status"])), Reason(int(values["reason"]))
 
     def _messages(self, name):
         for message, frames in self._codec.split(self._port.read(0.2)):
