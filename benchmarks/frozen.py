@@ -98,6 +98,17 @@ def rate(count: int, n: int) -> str:
     return f"{count} of {n} ({low:.1%} to {high:.1%})"
 
 
+def begun(out: Path) -> tuple[list[dict[str, Any]], str]:
+    """Rows that are there already, and the commit under test; refused where they are of another one."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    found, here = read_rows(out), commit()
+    try:
+        of_one_commit([*found, {"commit": here}])
+    except MixedCommitsError as error:
+        raise click.ClickException(f"{out}: {error}") from error
+    return found, here
+
+
 @click.command()
 @click.option("--trials", default=300, show_default=True, help="of all strata together")
 @click.option("--threads", default=2, show_default=True)
@@ -106,12 +117,7 @@ def main(trials: int, threads: int, out: Path) -> None:
     """Run the trials of this commit that are missing, and print the table."""
     from benchmarks.discrepancy import examined
 
-    out.parent.mkdir(parents=True, exist_ok=True)
-    found, here = read_rows(out), commit()
-    try:
-        of_one_commit([*found, {"commit": here}])
-    except MixedCommitsError as error:
-        raise click.ClickException(f"{out}: {error}") from error
+    found, here = begun(out)
     for stratum, number in missing(trials, found):
         s = seed(here, stratum, number)
         t = strata.drawn(stratum, number, s)

@@ -24,7 +24,7 @@ from ema.bundle import Bundle
 from ema.identification import Measurement, identifier
 from ema.models.envelope import envelope
 
-from .frozen import MixedCommitsError, commit, of_one_commit, read_rows
+from .frozen import begun, of_one_commit
 from .identification import quick_bundle
 from .strata import as_actuator
 
@@ -101,12 +101,7 @@ def _cells(these: list[dict[str, Any]]) -> str:
 @click.option("--out", type=click.Path(path_type=Path), default=Path("var/intervals.jsonl"), show_default=True)
 def main(cycles: int, out: Path) -> None:
     """Run the cycles of this commit that are missing, and print the table."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    found, here = read_rows(out), commit()
-    try:
-        of_one_commit([*found, {"commit": here}])
-    except MixedCommitsError as error:
-        raise click.ClickException(f"{out}: {error}") from error
+    found, here = begun(out)
     bundles = {plant: quick_bundle(as_actuator(hidden.PLANTS[plant])) for plant in PLANTS}
     for plant, faults, number in missing(cycles, found):
         new = [{"commit": here, **row} for row in answers(bundles[plant], plant, faults, number)]

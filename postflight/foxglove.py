@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ema.alarms.causes import OF_MONITOR
 from ema.bus.codec import Codec
 from ema.bus.codec import Message as DbcMessage
 from ema.bus.identifiers import actuator
@@ -20,13 +21,13 @@ from ema.core.status import AlarmLevel, AlarmState, LogState, ServiceState, Stat
 from ema.log import Message
 from ema.log.schemas import to_json
 
+from .live import ESTIMATES
 from .numeric import SamplesOfFrames, Series, of_message
 from .numeric_files import TOPIC, schema_of
 
 MOST = 1000  # samples of a channel in a second that are shown
 _MIB = 1 << 20
-_ESTIMATES = {"EstimateLinear": "linear", "EstimateLf2": "lf2", "EstimateHf": "hf"}
-_OF_MONITOR = 40  # causes from here on are the monitor's own, see the DBC
+_OF_MONITOR = {cause.name for cause in OF_MONITOR}
 
 
 class FoxgloveServer(Closing):
@@ -50,7 +51,7 @@ class FoxgloveServer(Closing):
 
         self._codec = codec
         self._samples = SamplesOfFrames(codec)
-        self._receiver = Receiver(codec, [*_ESTIMATES, "Alarm", "Heartbeat"])
+        self._receiver = Receiver(codec, [*ESTIMATES, "Alarm", "Heartbeat"])
         self._channels: dict[str, Any] = {}
         self._next_ns: dict[str, int] = {}
         self._foxglove, self._context = foxglove, foxglove.Context()
@@ -104,8 +105,8 @@ def _messages(message: DbcMessage, own: np.ndarray) -> Iterator[Message]:
     values = message.decode(own)
     for row, (number, t_ns) in enumerate(zip(actuator(own["id"]).tolist(), own["t_ns"].tolist(), strict=True)):
         one = {name: column[row] for name, column in values.items()}
-        if message.name in _ESTIMATES:
-            yield Message("/estimate", t_ns, _estimate(number, _ESTIMATES[message.name], one))
+        if message.name in ESTIMATES:
+            yield Message("/estimate", t_ns, _estimate(number, ESTIMATES[message.name], one))
         elif message.name == "Heartbeat":
             yield Message("/status", t_ns, _status(one))
         elif message.name == "Alarm" and int(one["cause"]):
@@ -136,11 +137,11 @@ def _status(one: dict[str, Any]) -> dict[str, Any]:
 
 
 def _alarm(number: int, one: dict[str, Any], causes: Mapping[int, str]) -> dict[str, Any]:
-    cause = int(one["cause"])
+    cause = causes.get(int(one["cause"]), str(int(one["cause"])))
     numbers = {name: float(one[name]) for name in ("value", "low", "high", "limit")}
     return {
-        "actuator": None if cause > _OF_MONITOR else number,
-        "cause": causes.get(cause, str(cause)),
+        "actuator": None if cause in _OF_MONITOR else number,
+        "cause": cause,
         "level": AlarmLevel(int(one["level"])).name.lower(),
         "state": AlarmState(int(one["state"])).name.lower(),
     } | numbers

@@ -18,7 +18,7 @@ from ema.core.status import LogState, Reason, ServiceState, Status
 
 SILENT_AFTER = 3.0  # a heartbeat comes every second [s]
 _EVENTS = 8
-_ESTIMATES = {"EstimateLinear": "linear", "EstimateLf2": "lf2", "EstimateHf": "hf"}
+ESTIMATES = {"EstimateLinear": "linear", "EstimateLf2": "lf2", "EstimateHf": "hf"}
 _LOSSES = ("n_lost", "n_crc_error", "n_wrong_counter", "n_wrong_length", "n_repeated", "n_reordered", "kernel_drops")
 
 
@@ -66,7 +66,7 @@ class Live:
     events: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=_EVENTS))
 
     def __post_init__(self) -> None:
-        wanted = [*_ESTIMATES, "EstimateNuisance", "Heartbeat", "CycleStart", "CycleEnd"]
+        wanted = [*ESTIMATES, "EstimateNuisance", "Heartbeat", "CycleStart", "CycleEnd"]
         self.alarms = AlarmListener(self.codec)
         self._receiver = Receiver(self.codec, wanted)
         self._silent = False
@@ -87,8 +87,8 @@ class Live:
             for row in range(len(own)):
                 one = {name: column[row] for name, column in values.items()}
                 t_ns, number = int(own["t_ns"][row]), int(identifiers.actuator(own["id"])[row])
-                if message.name in _ESTIMATES:
-                    self._estimate(t_ns, number, _ESTIMATES[message.name], one)
+                if message.name in ESTIMATES:
+                    self._estimate(t_ns, number, ESTIMATES[message.name], one)
                 elif message.name == "EstimateNuisance":
                     names = {key: message.fields[key].names.get(int(one[key]), "?") for key in ("method", "parameter")}
                     numbers = (float(one[key]) for key in ("value", "sd", "low", "high"))

@@ -26,7 +26,7 @@ def actuator_file(records: Sequence[Record], sheet: begin.Sheet, name: str) -> s
     text = resources.config("actuator.yaml").read_text(encoding="utf-8")
     p = sheet.pole_pairs or begin.pole_pairs(records[0])
     GR = sheet.gear or begin.gear_ratio(records[0])
-    k_e = None if sheet.KV is None else 60.0 / (2.0 * 3.141592653589793 * sheet.KV * 3.0**0.5)
+    k_e = None if sheet.KV is None else begin.back_emf(sheet.KV)
     changes = {
         "name": (name, "given"),
         "p": (p, "data sheet" if sheet.pole_pairs else "as the currents turn with the rotor"),

@@ -85,3 +85,16 @@ def faulty_flight(tmp_path_factory):
             log.write(schemas.ESTIMATE.encode(contents.estimate(t_ns, 0, cycle, made)))
     log.close()
     return directory
+
+
+@pytest.fixture
+def frame():
+    """Protected frames as the daemon sends them."""
+    codec, sender = codecs.default(), Sender()
+
+    def make(name, actuator=0, t_ns=1_741_943_700_000_000_000, **values):
+        fields = codec.messages[name].fields
+        zero = {key: np.zeros((1, f.n_values)) if f.n_values else 0 for key, f in fields.items()}
+        return sender.protect(codec.encode(name, actuator, zero | values, t_ns))
+
+    return make

@@ -16,23 +16,9 @@ from ema_postflight.foxglove import MOST, FoxgloveServer
 from websockets.sync.client import connect
 
 from ema.bus import codec as codecs
-from ema.bus.protection import Sender
 
 T0 = 1_741_943_700_000_000_000
 K = np.array([0.15, 0.0, 0.02, 0.0, 0.01, 0.3])
-
-
-@pytest.fixture
-def frame():
-    """Protected frames as the daemon and an actuator send them."""
-    codec, sender = codecs.default(), Sender()
-
-    def make(name, actuator=0, t_ns=T0, **values):
-        fields = codec.messages[name].fields
-        zero = {key: np.zeros((1, f.n_values)) if f.n_values else 0 for key, f in fields.items()}
-        return sender.protect(codec.encode(name, actuator, zero | values, t_ns))
-
-    return make
 
 
 class Client:
@@ -109,3 +95,14 @@ def test_a_port_that_is_taken_is_one_line(frame, tmp_path):
         done = subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True, timeout=120)
     assert done.returncode == 2
     assert re.fullmatch(r"ema: Foxglove cannot be served on 127\.0\.0\.1:\d+ \(.*\)\n", done.stderr)
+
+
+@pytest.mark.parametrize(("cause", "whose"), [("silent", "3"), ("log", "monitor")])
+def test_an_alarm_is_shown_as_whose_it_is(frame, cause, whose):
+    with FoxgloveServer(codecs.default(), "127.0.0.1", 0) as server:
+        seen = []
+        server._send = seen.append
+        server.update(
+            "vcan0", frame("Alarm", 3, cause=codecs.default().number("Alarm", "cause", cause), level=2, state=1)
+        )
+    assert [series.channel for series in seen] == [f"alarm/{whose}/{cause}"]

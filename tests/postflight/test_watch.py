@@ -17,23 +17,9 @@ from rich.console import Console
 
 from ema.bus import codec as codecs
 from ema.bus.interface import open_bus, parse
-from ema.bus.protection import Sender
 from ema.core.status import Reason, Status
 
 T0 = 1_741_943_700_000_000_000
-
-
-@pytest.fixture
-def frame():
-    """Protected frames as the daemon sends them."""
-    codec, sender = codecs.default(), Sender()
-
-    def make(name, actuator=0, t_ns=T0, **values):
-        fields = codec.messages[name].fields
-        zero = {key: np.zeros((1, f.n_values)) if f.n_values else 0 for key, f in fields.items()}
-        return sender.protect(codec.encode(name, actuator, zero | values, t_ns))
-
-    return make
 
 
 def _estimate(frame, actuator, cycle, k, status=Status.VALID, reason=0, name="EstimateLinear"):

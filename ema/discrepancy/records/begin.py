@@ -107,12 +107,17 @@ def gear_ratio(record: Record) -> float | None:
     return next((one.slope for one in agreements(record) if one.what == "theta_m against theta_u"), None)
 
 
+def back_emf(KV: float) -> float:
+    """k_e of one phase [V s/rad] from KV [rpm/V], which is of the line-to-line voltage."""
+    return float(60.0 / (2.0 * np.pi * KV * np.sqrt(3.0)))
+
+
 def _constants(sheet: Sheet) -> tuple[float, float, str]:
     """k_t, k_e and where they are from: KV is of the line-to-line voltage, currents are amplitude-invariant."""
     if sheet.k_t is not None:
         return sheet.k_t, sheet.k_t / 1.5, "data sheet"
     if sheet.KV is not None:
-        k_e = 60.0 / (2.0 * np.pi * sheet.KV * np.sqrt(3.0))
+        k_e = back_emf(sheet.KV)
         return 1.5 * k_e, k_e, f"KV {sheet.KV:g} rpm/V: k_e = 60 / (2 pi KV sqrt 3), k_t = 3/2 k_e"
     return 1.0, 1.0, "a guess: give --kv or --k-t; until then inertia and friction are in units of the current"
 
