@@ -93,7 +93,8 @@ def test_magnet_flux_is_named_from_a_file_and_extends_the_plant(hidden, tmp_path
     assert low < extended.effects["magnet_flux"]["change"] < high
     assert yaml.safe_load((out / "extended.yaml").read_text())["kind"] == "ema"
     report = (out / "report.html").read_text()
-    assert "Magnet flux changed" in report
+    assert "One of 2 that fit alike" in report
+    assert "magnet flux changed by -6.0%" in report
     assert "http" not in report.replace("http-equiv", "")
 
 
