@@ -31,6 +31,7 @@ from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.problem import ActuatorProblem
 from ema.discrepancy.engine.search import Search
 from ema.discrepancy.engine.weighing import Budget
+from ema.discrepancy.progress import Progress
 from ema.models.actuator import Actuator
 
 BUDGET = Budget(records=48, width=3, rounds=3, at_most=2, turns=3)  # some minutes of a core
@@ -55,7 +56,10 @@ def examined(name: str, n_threads: int) -> dict[str, Any]:
     plant = config.load(resources.config("actuator.yaml"), Actuator)
     begun = time.process_time()
     findings = examine(
-        plant, measured(plant, [record(name)]), n_threads=n_threads, say=lambda t: click.echo(f"  {t}", err=True)
+        plant,
+        measured(plant, [record(name)]),
+        n_threads=n_threads,
+        say=Progress(lambda t: click.echo(f"  {t}", err=True)),
     ).findings
     said = findings.as_dict()
     gain = said["gain"]

@@ -15,6 +15,7 @@ from ema.core.records import Record
 
 if TYPE_CHECKING:
     from ema.core.sidecar import Sidecar
+    from ema.discrepancy.findings import Findings
 
 # Which module examines which kind of plant.
 EXAMINERS = {"ema": "ema.discrepancy.actuator", "axis": "ema.discrepancy.axis"}
@@ -42,7 +43,8 @@ def discrepancy(
     A RECORD is a CSV file, a log, or a directory of logs.
 
     Writes findings.json, report.html (opens offline) and extended.yaml: the plant with the effects that were found,
-    which every other command accepts.
+    which every other command accepts. Interrupted (Ctrl-C) it writes the first two with what leads by then, marked as
+    unfinished.
 
     \b
     Examples:
@@ -51,14 +53,8 @@ def discrepancy(
       ema discrepancy --plant actuator.yaml log --cycles 17,18,20 --out findings
       ema discrepancy --out findings --explain magnet_flux
     """
-    from importlib import import_module
-
-    from rich.console import Console
-
     from ema.core import config
     from ema.discrepancy.explaining import read_findings, why
-    from ema.discrepancy.extended import write_extended
-    from ema.discrepancy.report import write_report
 
     from .integrity import tell
     from .plans import plan_of
@@ -71,14 +67,50 @@ def discrepancy(
     kind = config.read_yaml(plant_file).get("kind")
     if kind not in EXAMINERS:
         raise ConfigError(f"{plant_file}: key 'kind' = {kind!r}: must be one of {', '.join(EXAMINERS)}")
-    examiner = import_module(EXAMINERS[kind])
     read, empty = _read(records, plan_of(plant_file))
     read = _chosen(read, cycles)
-    findings_file, report, extended = (out / name for name in ("findings.json", "report.html", "extended.yaml"))
-    for path in (findings_file, report, extended):
+    files = [out / name for name in ("findings.json", "report.html", "extended.yaml")]
+    for path in files:
         if path.exists():
             raise ConfigError(f"{path}: exists, and is not overwritten; choose another --out")
     make_folder(out)
+    complaints = [line for record in read for line in record.complaints]
+    notes = [*_left_out(read, cycles), *empty, *complaints]
+    findings = _examined(EXAMINERS[kind], plant_file, read, records, files, notes)
+    if as_json:
+        click.echo(files[0].read_text(encoding="utf-8"), nl=False)
+    else:
+        for sentence in findings.sentences():
+            click.echo(sentence)
+        g = findings.gain
+        if g.folds is not None and findings.effects:
+            click.echo(g.folds.sentence(g.scale, g.unit))
+        for note in findings.notes:
+            click.echo(f"- {note}")
+        if explain is not None:
+            click.echo(why(findings.as_dict(), explain))
+        click.echo(f"{files[1]}")
+    if findings.verdict == "unfinished":
+        raise click.Abort
+    tell(complaints, [], list(records))
+
+
+def _examined(
+    examiner: str, plant_file: Path, read: list[Record], given: Sequence[Path], files: Sequence[Path], notes: list[str]
+) -> Findings:
+    """The findings, written into `files`; interrupted, what is known by then."""
+    from importlib import import_module
+
+    from rich.console import Console
+
+    from ema.core import config
+    from ema.discrepancy.extended import write_extended
+    from ema.discrepancy.progress import Progress
+    from ema.discrepancy.report import write_report
+
+    findings_file, report, extended = files
+    name = str(config.read_yaml(plant_file).get("name", plant_file.stem))
+    records = [str(path) for path in given]
     console = Console(stderr=True)
     with console.status("simulating") as status:
 
@@ -86,26 +118,28 @@ def discrepancy(
             console.print(f"  {text}", highlight=False)
             status.update(text)
 
-        findings, draw = examiner.discrepancy(plant_file, read, say)
-        complaints = [line for record in read for line in record.complaints]
-        findings.notes.extend([*_left_out(read, cycles), *empty, *complaints])
+        progress = Progress(say)
+        try:
+            findings, draw = import_module(examiner).discrepancy(plant_file, read, progress)
+        except KeyboardInterrupt:
+            if not progress.tried:
+                raise
+            findings = progress.unfinished()
+            findings.notes.extend(notes)
+            findings.write(findings_file)
+            write_report(report, name, records, findings, [])
+            return findings
+        findings.notes.extend(notes)
         findings.write(findings_file)
-        found = [*findings.effects, *findings.unnamed]
-        write_extended(plant_file, found, extended, findings.fitted)
+        write_extended(plant_file, [*findings.effects, *findings.unnamed], extended, findings.fitted)
         say("pictures")
-        name = str(config.read_yaml(plant_file).get("name", plant_file.stem))
-        write_report(report, name, [str(path) for path in records], findings, draw())
-    if as_json:
-        click.echo(findings_file.read_text(encoding="utf-8"), nl=False)
-    else:
-        for sentence in findings.sentences():
-            click.echo(sentence)
-        for note in findings.notes:
-            click.echo(f"- {note}")
-        if explain is not None:
-            click.echo(why(findings.as_dict(), explain))
-        click.echo(f"{report}")
-    tell(complaints, [], list(records))
+        try:
+            pictures = draw()
+        except KeyboardInterrupt:
+            write_report(report, name, records, findings, [])
+            raise
+        write_report(report, name, records, findings, pictures)
+    return findings
 
 
 def _read(paths: Sequence[Path], plan: Sidecar | None = None) -> tuple[list[Record], list[str]]:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from .fitting import Fit, fit, jacobian
-from .outcome import Gain, Outcome, RecordGain
-from .plant import Candidate, Errors, Free, Plant, Point
+from .held_out import by_record, over_folds, training_gain
+from .outcome import Gain, Outcome
+from .plant import Candidate, Free, Plant, Point
+from .progress import Progress
 from .selection import (
     FORM,
-    Progress,
     Tried,
     above_noise,
     alike,
@@ -25,8 +26,6 @@ from .selection import (
     is_nameless,
     is_worth_it,
     one_more,
-    silent,
-    training,
 )
 from .verdict import Verdict, judge
 
@@ -54,11 +53,13 @@ class _State:
     immaterial: str = ""  # what ended the selection by taking less than matters
 
 
-def examine(plant: Plant, progress: Progress = silent) -> Outcome:
+def examine(plant: Plant, progress: Progress | None = None) -> Outcome:
     """Examine a plant with its records."""
+    progress = progress or Progress()
     everything = list(range(len(plant.blocks)))
     progress("nominal model")
     plain = base_model(plant)
+    progress.fitted((), plain.rms, plain.fits[0].point)
     state = _State(plain, plain, [], [])
     notes: list[str] = []
     _select(plant, state, progress)
@@ -86,6 +87,7 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
         if state.immaterial:
             notes.append(f"{state.immaterial}: too little for a cause")
     last = _judged(plant, state.model)
+    folds = over_folds(plant, plain, state.model)
     names = [f.name for f in plant.base]
     return Outcome(
         verdict=outcome,
@@ -93,12 +95,13 @@ def examine(plant: Plant, progress: Progress = silent) -> Outcome:
         p_value=verdict.p_value,
         effects=_effects(plant, state, trust, final.point, final.draw),
         structure=plant.describe_structure(terms, final.point) if outcome == "unexplained" else {},
-        train=_gain(plant, plain, state.model, held_out=False),
-        heldout=_gain(plant, plain, state.model, held_out=True),
+        train=training_gain(plant, plain, state.model),
+        heldout=Gain(folds.err_before, folds.err_after, folds.noise_floor),
+        folds=folds,
         base=names,
         k_before=[float(before.point[n]) for n in names],
         k_after=[float(final.point[n]) for n in names],
-        records=_records(plant, plain, state.model),
+        records=by_record(plant, plain, state.model),
         tried=state.tried,
         mimicked=_mimicked(plant, final) if not chosen else (),
         k_error=tuple(np.sqrt(np.diag(final.covariance))[: len(names)].tolist()),
@@ -209,6 +212,7 @@ def _round(
     scale = min((t.scale for t in trials.values()), default=1.0)
     for key, trial in trials.items():
         gain = compare(trial, model, scale)
+        progress.fitted([c.key for c in trial.accepted], trial.rms, trial.fits[0].point)
         state.tried.append({"name": key, "round": number, "score": gain.gain, "error": gain.error, "rms": trial.rms})
     return trials
 
@@ -363,39 +367,3 @@ def _weights(trials: dict[str, Tried], before: Tried) -> dict[str, float]:
         logs[key] = -lead.gain / max(1.0, lead.error / 5.0)
     total = sum(np.exp(v) for v in logs.values())
     return {key: float(np.exp(v) / total) for key, v in logs.items()}
-
-
-def _gain(plant: Plant, plain: Tried, model: Tried, *, held_out: bool) -> Gain:
-    parts = [out if held_out else train for train, out in training(plant)]
-    rows: list[tuple[Errors, Errors]] = [
-        (plant.errors(a.point, blocks), plant.errors(b.point, blocks))
-        for a, b, blocks in zip(plain.fits, model.fits, parts, strict=True)
-    ]
-    mean = [
-        float(np.sqrt(np.mean([getattr(e, name) ** 2 for e in side])))
-        for side, name in (
-            ([r[0] for r in rows], "error"),
-            ([r[1] for r in rows], "error"),
-            ([r[1] for r in rows], "noise_floor"),
-        )
-    ]
-    return Gain(*mean)
-
-
-def _records(plant: Plant, plain: Tried, model: Tried) -> list[RecordGain]:
-    out = []
-    for group in dict.fromkeys(b.group for b in plant.blocks):
-        mine = {j for j, b in enumerate(plant.blocks) if b.group == group}
-        before, after = [], []
-        for (_, left_out), a, b in zip(training(plant), plain.fits, model.fits, strict=True):
-            blocks = [j for j in left_out if j in mine]
-            if blocks:
-                before.append(plant.errors(a.point, blocks))
-                after.append(plant.errors(b.point, blocks))
-        pooled = [
-            float(np.sqrt(np.mean(np.square(x))))
-            for x in ([e.error for e in before], [e.error for e in after], [e.noise_floor for e in after])
-        ]
-        rms = [replace(t, held_out=tuple(t.held_out[j] for j in sorted(mine))).rms for t in (plain, model)]
-        out.append(RecordGain(group, *pooled, *rms))
-    return out

@@ -7,9 +7,13 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from ema.core.version import version
 
-Verdict = Literal["adequate", "explained", "partly explained", "unexplained"]
+from .folds import Folds
+
+Verdict = Literal["adequate", "explained", "partly explained", "unexplained", "unfinished"]
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,7 @@ class Gain:
     what: str = "error of the simulated envelope"
     scale: float = 1e3
     unit: str = "mA"
+    folds: Folds | None = None  # what the held-out errors are made of, where every part was held out once
 
     @property
     def rest(self) -> float:
@@ -68,7 +73,10 @@ class Gain:
 
 
 def graded(verdict: Literal["adequate", "explained", "unexplained"], gain: Gain) -> Verdict:
-    """The verdict, where causes that are named leave more than noise of what they were not fitted to."""
+    """The verdict, where causes that are named leave more than noise of what they were not fitted to.
+
+    That is measured over folds, so that no lucky split decides.
+    """
     return "partly explained" if verdict == "explained" and gain.rest > EXPLAINED else verdict
 
 
@@ -95,6 +103,9 @@ class Findings:
         Of the simulations that the answer rests on, where there are any.
     balance : dict
         What a regression of the balance of torque along the measured motion explains, where the plant has one.
+    leading : list of dict
+        Of a search that was interrupted the sets that led: ``effects``, what they leave of held-out parts over noise
+        (``left``), ``parameters``, and what was ``fitted`` beside them.
     """
 
     verdict: Verdict
@@ -110,26 +121,30 @@ class Findings:
     rejected: list[dict[str, Any]] = field(default_factory=list)
     seeds: dict[str, int] = field(default_factory=dict)
     balance: dict[str, Any] = field(default_factory=dict)
+    leading: list[dict[str, Any]] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
         """The content of findings.json."""
         g = self.gain
+        known = _known if self.verdict == "unfinished" else float
         return {
             "verdict": self.verdict,
+            **({"unfinished": True, "leading": self.leading} if self.verdict == "unfinished" else {}),
             "effects": [asdict(effect) for effect in self.effects],
             "structure": self.structure,
             "gain": {
-                "train": {"err_before": g.train_before, "err_after": g.train_after},
+                "train": {"err_before": known(g.train_before), "err_after": known(g.train_after)},
                 "heldout": {
-                    "err_before": g.heldout_before,
-                    "err_after": g.heldout_after,
-                    "noise_floor": g.noise_floor,
+                    "err_before": known(g.heldout_before),
+                    "err_after": known(g.heldout_after),
+                    "noise_floor": known(g.noise_floor),
                 },
                 **({"k_names": list(g.k_names)} if g.k_names else {}),
                 "k_before": list(g.k_before),
                 "k_after": list(g.k_after),
                 "false_alarms_before": g.false_alarms_before,
                 "false_alarms_after": g.false_alarms_after,
+                **({"folds": g.folds.as_dict()} if g.folds else {}),
             },
             "rejected": self.rejected,
             "tried": self.tried,
@@ -147,6 +162,8 @@ class Findings:
 
     def sentences(self) -> list[str]:
         """What an engineer would say."""
+        if self.verdict == "unfinished":
+            return [_led(self.leading)]
         if self.verdict == "adequate":
             if not self.rest:
                 return ["The simulation agrees with the measurement: what is left is noise."]
@@ -190,6 +207,22 @@ def _said(effect: FoundEffect) -> str:
     elif odds < SURE:
         text += f" (to be confirmed by {effect.separated_by})"
     return text + "."
+
+
+def _led(leading: list[dict[str, Any]]) -> str:
+    """What led when a search was interrupted."""
+    first, *others = leading
+    text = f"Unfinished: nothing is decided yet. {_named(first)} led"
+    return text + (f", before {', '.join(map(_named, others[:2]))}." if others else "; nothing else was fitted yet.")
+
+
+def _named(tried: dict[str, Any]) -> str:
+    return f"{' + '.join(tried['effects']) or 'no effect'} (leaves {tried['left']:.3g} times what noise makes)"
+
+
+def _known(x: float) -> float | None:
+    """What was measured; None where nothing was."""
+    return float(x) if np.isfinite(x) else None
 
 
 def describe(structure: dict[str, Any], none: str = "none that stands out") -> str:

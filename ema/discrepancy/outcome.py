@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from .folds import Folds
 from .plant import Point
 
 
@@ -72,3 +73,4 @@ class Outcome:
     point: Point = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     rest: float = 0.0
+    folds: Folds | None = None

@@ -80,10 +80,14 @@ class Block:
 
 @dataclass(frozen=True)
 class Errors:
-    """Error of a simulation over some blocks, without unit, and what noise alone would make of it."""
+    """Error of a simulation over some blocks, without unit, and what noise alone would make of it.
+
+    `weight` is how much the blocks count beside others of the same record.
+    """
 
     error: float
     noise_floor: float
+    weight: float = 1.0
 
 
 class Plant(Protocol):

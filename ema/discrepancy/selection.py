@@ -89,13 +89,6 @@ def compare(one: Tried, other: Tried, scale: float | None = None) -> Comparison:
     return Comparison(float(d.sum()), error, scale, is_local)
 
 
-Progress = Callable[[str], None]
-
-
-def silent(_: str) -> None:
-    """No progress shown."""
-
-
 def training(plant: Plant) -> list[tuple[list[int], list[int]]]:
     """For each fold the blocks to fit on and those left out."""
     everything = range(len(plant.blocks))
@@ -143,7 +136,10 @@ def base_model(plant: Plant) -> Tried:
 
 
 def one_more(
-    plant: Plant, model: Tried, suggest: Callable[[Point, Sequence[int]], Sequence[Candidate]], progress: Progress
+    plant: Plant,
+    model: Tried,
+    suggest: Callable[[Point, Sequence[int]], Sequence[Candidate]],
+    progress: Callable[[str], None],
 ) -> dict[str, Tried]:
     """The model with each suggested candidate added. A candidate must be suggested by every fold's training blocks."""
     suggested, frozen = [], []

@@ -19,13 +19,14 @@ from pathlib import Path
 
 from ema.core.records import Record
 from ema.discrepancy.findings import Findings
+from ema.discrepancy.progress import Progress
 from ema.discrepancy.report import Picture
 from ema.identification.alignment import aligned
 from ema.models import actuator_file
 
 
 def discrepancy(
-    plant_file: Path, records: Sequence[Record], say: Callable[[str], None]
+    plant_file: Path, records: Sequence[Record], say: Progress
 ) -> tuple[Findings, Callable[[], list[Picture]]]:
     """Findings on records of the actuator in `plant_file`, and what draws their pictures."""
     from .cycles import measured

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ema.core.errors import RecordError
 from ema.discrepancy.findings import Findings
+from ema.discrepancy.progress import Progress
 from ema.models.actuator import Actuator
 
 from .conditions import as_recorded
@@ -63,14 +63,13 @@ def split(data: Measured) -> tuple[list[int], list[int]]:
     return sorted(train), sorted(heldout)
 
 
-def examine(
-    plant: Actuator, data: Measured, *, n_threads: int = 2, say: Callable[[str], None] = lambda t: None
-) -> Examination:
+def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progress | None = None) -> Examination:
     """What the simulation of `plant` gets wrong about `data`."""
     if data.n_cycles < MIN_CYCLES:
         raise RecordError(
             f"{data.labels[0]}: is the only cycle; at least {MIN_CYCLES} are needed, to test on one what another says"
         )
+    say = say or Progress()
     data, left_out = thinned(data)
     stated = plant
     train, heldout = split(data)

@@ -14,9 +14,9 @@ from ema.effects.base import T_REFERENCE
 
 from .examine import Examination
 from .features import GROUPS, SECTORS, Array
+from .leave_out import settled
 from .plant import ENVELOPE_STEP, Point
 from .search import FINAL_SEED, N_FINAL
-from .telling import settled
 from .thinning import spread
 from .weak import ORDERS, Torque, line, share_explained, torque
 

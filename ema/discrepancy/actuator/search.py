@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from ema.discrepancy.progress import Progress
 
 from .candidates import Candidate
 from .features import Array
@@ -21,8 +23,6 @@ N_GLANCE = 4  # seeds that tell a good start from a bad one
 K_SEEN = 0.01  # a fault that is there
 CHANCE = 0.03  # difference in misfit that seeds make
 FAR = 100.0  # excess from which candidates are simulated before they are ranked
-
-Say = Callable[[str], None]
 
 
 @dataclass
@@ -60,7 +60,7 @@ class Search:
     noise: Noise
     train: list[int]
     heldout: list[int]
-    say: Say = lambda text: None
+    say: Progress = field(default_factory=Progress)
     columns: dict[tuple[int, str], Array] = field(default_factory=dict)
     probed: dict[str, Candidate] = field(default_factory=dict)
     tried: list[Model] = field(default_factory=list)
@@ -87,7 +87,7 @@ class Search:
     def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:
         made = Model(tuple(effects), fitted, self._misfit(self.noise, fitted.point, self.heldout))
         self.tried.append(made)
-        self.say(f"{' + '.join(made.names) or 'faults only'}: held-out misfit {made.heldout:.3g}")
+        self.say.fitted(made.names, made.heldout, made.fit.point, by=self.noise)
         return made
 
     def excess_by(self, noise: Noise, model: Model) -> float:

@@ -16,9 +16,10 @@ from . import controller, repeating
 from .candidates import Candidate
 from .extension import as_extension
 from .fit import SEED, Fit
+from .leave_out import over_folds, square
 from .noise import SEED as NOISE_SEED
 from .noise import Verdict
-from .plant import ENVELOPE_STEP, EmaPlant, Point
+from .plant import Point
 from .search import CHANCE, FINAL_SEED, K_SEEN, N_FINAL, Model, Search
 from .structure import structure
 from .weighing import WORTH_IT, is_enough
@@ -29,7 +30,6 @@ NAMED = 0.95  # share of what faults alone leave that effects must explain to be
 UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: a rest is left that nothing explains, or
 LITTLE = 2.0  # what faults alone leave is no more than this excess, which two effects together nearly always explain
 LOUD, MOST = 1.3, 0.5  # misfit of a cycle that shows a rest; share of it that is worth a word
-ENVELOPE_SETTLING = 15e-3  # [s]
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
 SEEDS = {"noise": NOISE_SEED, "fit": SEED, "held out": FINAL_SEED}  # the first of each
 NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none
@@ -224,33 +224,25 @@ def odds(search: Search, model: Model, effect: str, *rivals: str) -> list[float]
     return [float(0.99 * by_misfit.get(name, 0.0) / sum(by_misfit.values())) for name in (effect, *rivals)]
 
 
-def settled(plant: EmaPlant) -> int:
-    """First sample of the envelope that the low-pass no longer ties to the unknown current at the start."""
-    return round(ENVELOPE_SETTLING * plant.plant.control.rate) // ENVELOPE_STEP
-
-
-def envelope_error(search: Search, point: Point, cycles: list[int]) -> float:
+def _envelope_error(search: Search, point: Point, cycles: list[int]) -> float:
     """Rms of measured less mean simulated envelope over cycles. [A]"""
-    plant = search.plant
-    runs = plant.repeated([point], cycles, N_FINAL, FINAL_SEED)[0]
-    errors = [plant.data.envelopes[c][::ENVELOPE_STEP] - runs[c].envelopes.mean(axis=0) for c in cycles]
-    return float(np.sqrt(np.mean([np.mean(e[settled(plant) :] ** 2) for e in errors])))
+    runs = search.plant.repeated([point], cycles, N_FINAL, FINAL_SEED)[0]
+    return float(np.sqrt(np.mean([square(search.plant, c, runs[c].envelopes.mean(axis=0)) for c in cycles])))
 
 
 def _gain(search: Search, before: Model, after: Model) -> Gain:
-    floor = np.sqrt(
-        np.mean([np.mean(search.noise.of(c).envelope_sd[settled(search.plant) :] ** 2) for c in search.heldout])
-        * (1.0 + 1.0 / N_FINAL)
-    )
+    search.say("every cycle held out once")
+    folds = over_folds(search, before, after)
     k_before, k_after = (tuple(round(m.fit.point.get(n, 0.0), 5) for n in FAULTS) for m in (before, after))
     return Gain(
-        envelope_error(search, before.fit.point, search.train),
-        envelope_error(search, after.fit.point, search.train),
-        envelope_error(search, before.fit.point, search.heldout),
-        envelope_error(search, after.fit.point, search.heldout),
-        float(floor),
+        _envelope_error(search, before.fit.point, search.train),
+        _envelope_error(search, after.fit.point, search.train),
+        folds.err_before,
+        folds.err_after,
+        folds.noise_floor,
         k_before,
         k_after,
         sum(x > FAULT_ALARM for x in k_before),
         sum(x > FAULT_ALARM for x in k_after),
+        folds=folds,
     )

@@ -28,11 +28,12 @@ from pathlib import Path
 
 from ema.core.records import Record
 from ema.discrepancy.findings import Findings
+from ema.discrepancy.progress import Progress
 from ema.discrepancy.report import Picture
 
 
 def discrepancy(
-    plant_file: Path, records: Sequence[Record], say: Callable[[str], None]
+    plant_file: Path, records: Sequence[Record], say: Progress
 ) -> tuple[Findings, Callable[[], list[Picture]]]:
     """Findings on records of the axis in `plant_file`, and what draws their pictures."""
     from ema.models import axis_config

@@ -17,7 +17,8 @@ import numpy as np
 from ema.discrepancy.examine import examine
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Point
-from ema.discrepancy.selection import Progress, Tried, above_noise, base_model, compare, silent
+from ema.discrepancy.progress import Progress
+from ema.discrepancy.selection import Tried, above_noise, base_model, compare
 from ema.discrepancy.verdict import judge
 
 from .plant import AxisPlant
@@ -35,8 +36,9 @@ SAID = {
 }
 
 
-def examined(plant: AxisPlant, progress: Progress = silent) -> Outcome:
+def examined(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     """`examine`, with the drive between samples as the record shows it; told where it does not run straight."""
+    progress = progress or Progress()
     if all(w.static for w in plant.windows):
         return examine(plant, progress)
     progress("the drive between samples")

@@ -128,12 +128,13 @@ class AxisPlant:
             squares.setdefault(self.windows[j].group, []).append(
                 (float(np.mean(r[main] ** 2)), float(np.mean(floor[main])), power, len(y))
             )
-        shares = []
+        shares, weight = [], 0.0
         for parts in squares.values():
             error, noise, power, n = np.array(parts).T
             shares.append((error @ n / (power @ n), noise @ n / (power @ n)))
+            weight += float(power @ n)
         error, noise = np.sqrt(np.mean(shares, axis=0))
-        return Errors(float(error), float(noise))
+        return Errors(float(error), float(noise), weight)
 
     def describe(
         self, found: Sequence[Candidate], point: Point, draw: Callable[[int], Sequence[Point]]

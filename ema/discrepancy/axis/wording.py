@@ -34,6 +34,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         what="error of the free run over the record's own size",
         scale=100.0,
         unit="%",
+        folds=outcome.folds,
     )
     structure = dict(outcome.structure)
     if structure:

@@ -1,0 +1,86 @@
+"""Every cycle held out once: the answer's parameters are fitted to the other cycles, and foretell this one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema.discrepancy.folds import Folds, dealt
+
+from .features import Array
+from .fit import bounded, bounds, columns, moved, residuals, stacked_jacobian
+from .plant import ENVELOPE_STEP, EmaPlant, Point
+from .search import FINAL_SEED, N_FINAL, N_GLANCE, Model, Search
+
+N_FOLDS = 8  # at most; of more cycles several are left out together
+ENVELOPE_SETTLING = 15e-3  # [s]
+
+
+def settled(plant: EmaPlant) -> int:
+    """First sample of the envelope that the low-pass no longer ties to the unknown current at the start."""
+    return round(ENVELOPE_SETTLING * plant.plant.control.rate) // ENVELOPE_STEP
+
+
+@dataclass(frozen=True)
+class _Linear:
+    """A model to first order about its point: whitened residuals and Jacobian of each cycle, its cost at a glance."""
+
+    model: Model
+    r: dict[int, Array]
+    J: dict[int, Array]
+    cost: dict[int, float]
+
+    @classmethod
+    def of(cls, search: Search, model: Model, cycles: list[int]) -> _Linear:
+        plant, noise, frees, point = search.plant, search.noise, model.fit.free, model.fit.point
+        known = model.fit.columns
+        new = [m for m in range(plant.n_motions) if any((m, f.name) not in known for f in frees)]
+        cols = known | columns(plant, frees, point, new)
+        r = residuals(plant, noise, point, cycles, N_FINAL, FINAL_SEED)
+        glance = residuals(plant, noise, point, cycles, N_GLANCE)
+        cost = {c: float(x @ x) for c, x in glance.items()}
+        return cls(model, r, {c: stacked_jacobian(noise, frees, cols, [c]) for c in cycles}, cost)
+
+    def fitted_to(self, search: Search, cycles: list[int]) -> Point:
+        """One step of Gauss–Newton from the point; the point itself where simulation says that the step leads away."""
+        frees, point = self.model.fit.free, self.model.fit.point
+        J, r = (np.concatenate([of[c] for c in cycles]) for of in (self.J, self.r))
+        step, _ = bounded(J, r, *bounds(frees, point))
+        there = moved(point, frees, step)
+        (gone,) = search.costs([there], cycles, typical=False)
+        return there if gone < sum(self.cost[c] for c in cycles) else point
+
+
+def over_folds(search: Search, before: Model, after: Model) -> Folds:
+    """What `before` and `after` leave of the envelope of each cycle when the other cycles alone give their parameters.
+
+    Parameters are refitted to first order about the answer, which costs two simulations of each cycle and fold instead
+    of a fit. Which effects these are was decided with all cycles.
+    """
+    plant, data = search.plant, search.plant.data
+    cycles = sorted(range(data.n_cycles), key=lambda c: (int(data.motion[c]), c))
+    models = [before] if after is before else [before, after]
+    linear = [_Linear.of(search, m, cycles) for m in models]
+    squares: list[dict[int, float]] = [{} for _ in models]
+    for fold in dealt(cycles, N_FOLDS):
+        rest = [c for c in cycles if c not in fold]
+        points = [m.fitted_to(search, rest) for m in linear]
+        runs = plant.repeated(points, fold, N_FINAL, FINAL_SEED)
+        for of, at in zip(squares, runs, strict=True):
+            of |= {c: square(plant, c, at[c].envelopes.mean(axis=0)) for c in fold}
+    floor = [_floor(search, c) for c in sorted(cycles)]
+    left = [tuple(of[c] for c in sorted(cycles)) for of in squares]
+    return Folds(data.labels, left[0], left[-1], tuple(floor), (1.0,) * len(cycles))
+
+
+def square(plant: EmaPlant, cycle: int, simulated: Array) -> float:
+    """Mean square of measured less simulated envelope. [A²]"""
+    error = plant.data.envelopes[cycle][::ENVELOPE_STEP] - simulated
+    return float(np.mean(error[settled(plant) :] ** 2))
+
+
+def _floor(search: Search, cycle: int) -> float:
+    """What noise makes of a cycle and of the mean of the runs it is compared with. [A²]"""
+    sd = search.noise.of(cycle).envelope_sd[settled(search.plant) :]
+    return float(np.mean(sd**2)) * (1.0 + 1.0 / N_FINAL)

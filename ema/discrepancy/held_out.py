@@ -1,0 +1,91 @@
+"""What was gained: on parts that were fitted, on parts that were held out, and by record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .folds import Folds
+from .outcome import Gain, RecordGain
+from .plant import Errors, Plant
+from .selection import Tried, training
+
+N_PARTS = 20  # at most, of all records together; neighbouring stretches of one record make one
+
+
+def training_gain(plant: Plant, plain: Tried, model: Tried) -> Gain:
+    """Errors before and after on the parts that the fits have seen."""
+    blocks = [train for train, _ in training(plant)]
+    before, after = (
+        [plant.errors(f.point, own) for f, own in zip(t.fits, blocks, strict=True)] for t in (plain, model)
+    )
+    return Gain(_pooled(before), _pooled(after), _pooled_floor(after))
+
+
+def over_folds(plant: Plant, plain: Tried, model: Tried) -> Folds:
+    """Errors before and after of every part of the records, each by the fits that had not seen it."""
+    parts = _parts(plant)
+    rows = [(name, *_of_part(plant, plain, model, blocks)) for name, _, blocks in parts]
+    names, before, after, floor, weight = zip(*rows, strict=True)
+    of_group: dict[str, float] = {}
+    for (_, group, _), w in zip(parts, weight, strict=True):
+        of_group[group] = of_group.get(group, 0.0) + w
+    shares = tuple(w / of_group[group] for (_, group, _), w in zip(parts, weight, strict=True))  # records count alike
+    return Folds(names, before, after, floor, shares)
+
+
+def by_record(plant: Plant, plain: Tried, model: Tried) -> list[RecordGain]:
+    """Errors before and after of the held-out parts of each record."""
+    out = []
+    for group in dict.fromkeys(b.group for b in plant.blocks):
+        mine = {j for j, b in enumerate(plant.blocks) if b.group == group}
+        before, after = (_errors(plant, t, mine) for t in (plain, model))
+        rms = [replace(t, held_out=tuple(t.held_out[j] for j in sorted(mine))).rms for t in (plain, model)]
+        out.append(RecordGain(group, _pooled(before), _pooled(after), _pooled_floor(after), *rms))
+    return out
+
+
+def _errors(plant: Plant, model: Tried, blocks: set[int]) -> list[Errors]:
+    """Of some blocks, by the fit of each fold that left some of them out."""
+    found = []
+    for (_, left_out), fitted in zip(training(plant), model.fits, strict=True):
+        if own := [j for j in left_out if j in blocks]:
+            found.append(plant.errors(fitted.point, own))
+    return found
+
+
+def _parts(plant: Plant) -> list[tuple[str, str, set[int]]]:
+    """Name, record and blocks of each part."""
+    groups = list(dict.fromkeys(b.group for b in plant.blocks))
+    n_each = max(1, N_PARTS // len(groups))
+    parts = []
+    for group in groups:
+        of: dict[int, list[int]] = {}
+        for j, block in enumerate(plant.blocks):
+            if block.group == group:
+                of.setdefault(block.stretch, []).append(j)
+        stretches = list(of.values())
+        for k, some in enumerate(np.array_split(np.arange(len(stretches)), min(n_each, len(stretches)))):
+            parts.append((f"{group}, part {k + 1}", group, {j for s in some for j in stretches[s]}))
+    return parts
+
+
+def _of_part(plant: Plant, plain: Tried, model: Tried, blocks: set[int]) -> tuple[float, float, float, float]:
+    """Mean squares before, after and of the floor, and the weight."""
+    before, after = (_errors(plant, t, blocks) for t in (plain, model))
+    w = np.array([e.weight for e in after])
+    squares = (
+        float(np.square(x) @ w / w.sum())
+        for x in ([e.error for e in before], [e.error for e in after], [e.noise_floor for e in after])
+    )
+    b, a, f = squares
+    return b, a, f, float(w.sum())
+
+
+def _pooled(errors: list[Errors]) -> float:
+    return float(np.sqrt(np.mean([e.error**2 for e in errors])))
+
+
+def _pooled_floor(errors: list[Errors]) -> float:
+    return float(np.sqrt(np.mean([e.noise_floor**2 for e in errors])))
