@@ -7,15 +7,14 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from ema.alarms.bus import COMMAND
 from ema.bundle import Bundle
-from ema.bus.codec import Codec, default
-from ema.bus.interface import open_bus
+from ema.bus.codec import default
 from ema.log import LogSettings, LogWriter
 from ema.monitor import Monitor, Runner
 from ema.monitor.presence import Presence
 
 from .alarming import AlarmDesk
+from .ear import Ear
 from .health import Health
 from .identity import ATTACHMENT, Identity
 from .remote import RemoteRunner
@@ -29,15 +28,26 @@ from .worker import Worker
 
 
 @contextmanager
-def assembled(settings: DaemonSettings) -> Iterator[Service]:
+def assembled(settings: DaemonSettings, ear: Ear | None = None) -> Iterator[Service]:
     """A service ready to run; afterwards bus and log are closed.
+
+    Parameters
+    ----------
+    settings : DaemonSettings
+    ear : Ear, optional
+        The configuration's bus, if it is already open; taken over and closed.
 
     Raises
     ------
     ConfigError, BundleError, BusError, LogError
         One line each.
     """
-    codec = default()
+    with ear or Ear(settings.bus) as listening:
+        yield from _assembled(settings, listening)
+
+
+def _assembled(settings: DaemonSettings, ear: Ear) -> Iterator[Service]:
+    codec, port = default(), ear.port
     bundles = load_bundles(settings)
     configuration = text(settings)
     identity = Identity.of(bundles, configuration)
@@ -59,7 +69,6 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
     }
     log_settings = LogSettings(**settings.log.model_dump(exclude={"directory"}))
     with ExitStack() as stack:
-        port = stack.enter_context(open_bus(settings.bus, [*_heard(codec), *presence.filters()], role="Monitor"))
         log = stack.enter_context(LogWriter(settings.log.directory, attachments, log_settings))
         state = StateFile(Path(settings.alarms.state or Path(settings.log.directory) / "alarms.json"))
         stack.enter_context(state)
@@ -79,12 +88,7 @@ def assembled(settings: DaemonSettings) -> Iterator[Service]:
         supervisor = promised(bundles, every, remote, watch)
         answering = {method: runner.answers for method, runner in remote.items()}
         health = Health(monitor, port, log, supervisor, answering)
-        yield Service(monitor, port, log, codec, workers, settings.pace, health, watch, desk, turn, identity)
-
-
-def _heard(codec: Codec) -> list[tuple[int, int]]:
-    """Filters of what the monitor listens to: actuators, and operators' commands with their seals."""
-    return [*codec.filters("Actuator"), *codec.filters_of(COMMAND, "TesterSeal", "TesterSession")]
+        yield Service(monitor, port, log, codec, workers, settings.pace, health, watch, desk, turn, identity, ear)
 
 
 def _manifests(bundles: dict[int, Bundle]) -> dict[str, bytes]:

@@ -30,47 +30,52 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
 
     sys.modules.update(dict.fromkeys(UNUSED))  # type: ignore[arg-type]
 
-    from ema.bus import interface
-    from ema.core.errors import EmaError, Failure, OccupiedError
+    from ema.bus.interface import BusSettings, elsewhere
 
-    from . import signals
+    from .ear import Ear, load_bus
     from .journal import use_journal
-    from .reload import Reloader
-    from .settings import DaemonSettings, load
 
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(message)s")
     use_journal()
 
-    def read() -> DaemonSettings:
-        settings = load(config_path)
-        if bus is not None:
-            settings = settings.model_copy(update={"bus": interface.elsewhere(settings.bus, bus)})
-        if log_path is not None:
-            log = settings.log.model_copy(update={"directory": str(Path(log_path).resolve())})
-            settings = settings.model_copy(update={"log": log})
-        return settings
+    def chosen(configured: BusSettings) -> BusSettings:
+        return configured if bus is None else elsewhere(configured, bus)
 
-    settings = read()
+    with Ear(chosen(load_bus(config_path))) as ear:
+        # It listens for another monitor while all this, most of the start, is imported and read.
+        from ema.core.errors import EmaError, Failure, OccupiedError
 
-    from .assembly import assembled
+        from . import signals
+        from .assembly import assembled
+        from .reload import Reloader
+        from .settings import DaemonSettings, load
 
-    started = False
-    try:
-        with assembled(settings) as service:
-            reloader = Reloader(settings, read, service.log, service.desk)
-            signals.decide(
-                {
-                    **dict.fromkeys(signals.STOPPING, service.stop),
-                    signal.SIGHUP: lambda: service.ask(lambda: service.reload(reloader)),
-                    signal.SIGUSR1: lambda: service.ask(service.cut_log),
-                    signal.SIGUSR2: lambda: service.ask(service.tell),
-                }
-            )
-            started = True
-            service.run()
-    except OccupiedError:
-        raise
-    except EmaError as error:
-        if started:  # so it is not of the configuration
-            raise Failure(str(error)) from error
-        raise
+        def read() -> DaemonSettings:
+            settings = load(config_path)
+            settings = settings.model_copy(update={"bus": chosen(settings.bus)})
+            if log_path is not None:
+                log = settings.log.model_copy(update={"directory": str(Path(log_path).resolve())})
+                settings = settings.model_copy(update={"log": log})
+            return settings
+
+        settings = read()
+        started = False
+        try:
+            with assembled(settings, ear) as service:
+                reloader = Reloader(settings, read, service.log, service.desk)
+                signals.decide(
+                    {
+                        **dict.fromkeys(signals.STOPPING, service.stop),
+                        signal.SIGHUP: lambda: service.ask(lambda: service.reload(reloader)),
+                        signal.SIGUSR1: lambda: service.ask(service.cut_log),
+                        signal.SIGUSR2: lambda: service.ask(service.tell),
+                    }
+                )
+                started = True
+                service.run()
+        except OccupiedError:
+            raise
+        except EmaError as error:
+            if started:  # so it is not of the configuration
+                raise Failure(str(error)) from error
+            raise

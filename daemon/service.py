@@ -32,6 +32,7 @@ from ema.monitor import (
 
 from .alarming import AlarmDesk
 from .arrival import Arrival
+from .ear import Ear
 from .health import Health
 from .identity import Identity
 from .memory import settle
@@ -73,6 +74,8 @@ class Service:
     turn : Turn
     identity : Identity, optional
         What is told of the software, the bundles and the configuration; nothing without.
+    ear : Ear, optional
+        Who has listened to the port until the loop does.
     """
 
     def __init__(
@@ -88,6 +91,7 @@ class Service:
         desk: AlarmDesk,
         turn: Turn,
         identity: Identity | None = None,
+        ear: Ear | None = None,
     ):
         self._monitor, self._port, self._log = monitor, port, log
         self._bus_sink, self._log_sink = BusSink(Voice(port, turn), codec), LogSink(log)
@@ -102,6 +106,7 @@ class Service:
         self._stuck = False
         self._stopping = False
         self._identity, self._identified = identity, -np.inf
+        self._ear = ear
         self._asked: deque[Callable[[], None]] = deque()
 
     @property
@@ -140,12 +145,15 @@ class Service:
 
     def run(self) -> None:
         """Run until stopped; then finish what is begun."""
-        started = next_beat = next_look = time.monotonic()
+        next_beat = next_look = time.monotonic()
+        started = next_look if self._ear is None else self._ear.since
         self._event(Level.INFO, "started", self._port.choice)
         self._desk.start(time.time_ns())
         settle()
         sys.setswitchinterval(_SWITCH)
-        self._take_turn(started, 0.0)
+        for at, frames in self._ear.end() if self._ear else ():
+            self._turn.presence.without(frames, at)
+        self._take_turn(time.monotonic(), time.monotonic() - started)
         while not self._stopping:
             frames = self._port.read(min(_WAIT, max(0.0, next_look - time.monotonic())))
             urgent = False
@@ -163,7 +171,7 @@ class Service:
                 changed = self._look(now)
                 next_look = max(next_look + LOOK, now)
                 if self._turn.listening:
-                    next_beat = now
+                    next_beat, next_look = now, min(next_look, started + self._turn.listen)
                 elif now >= next_beat or changed:
                     self._beat(now - started)
                     next_beat = max(next_beat + BEAT, now) if now >= next_beat else next_beat

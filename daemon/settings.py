@@ -24,6 +24,7 @@ from ema.log import LogSettings
 from ema.models.actuator import Actuator
 from ema.monitor import MonitorSettings
 
+from .ear import located
 from .sinks import estimate_message
 from .supervision import SupervisionSettings
 
@@ -116,15 +117,11 @@ def load(path: Path) -> DaemonSettings:
         state=str(folder / settings.alarms.state) if settings.alarms.state else None,
     )
     remote = {method: str(folder / socket) for method, socket in settings.remote.items()}
-    key_file, session_file = settings.bus.key_file, settings.bus.session_file
-    bus = settings.bus.model_copy(
-        update={"key_file": key_file and folder / key_file, "session_file": session_file and folder / session_file}
-    )
     trusted = [str(folder / path) for path in settings.trusted_keys]
     return settings.model_copy(
         update={
             "trusted_keys": trusted,
-            "bus": bus,
+            "bus": located(settings.bus, path),
             "actuators": actuators,
             "log": log,
             "alarms": alarms,

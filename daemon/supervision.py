@@ -41,7 +41,9 @@ class SupervisionSettings(Settings):
     """When something that the configuration promises is late."""
 
     silence: float = quantity("s", "an actuator that is on is heard more often than this", 1.0, gt=0, le=60)
-    listen: float = quantity("s", "so long another monitor is listened for before this one speaks", 1.5, ge=0, le=60)
+    listen: float = quantity(
+        "s", "so long another monitor, heard every second, is listened for at first", 1.4, ge=0, le=60
+    )
     cycle: float = quantity("s", "test cycles of an actuator come more often than this", 1.7, gt=0, le=86400)
     age: dict[str, float] = Field(
         default={"linear": 1.0, "lf2": 2.0, "hf": 10.0},

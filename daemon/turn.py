@@ -29,8 +29,8 @@ class Turn:
     """
 
     def __init__(self, presence: Presence, bus: str, listen: float, standby: bool):
-        self.presence = presence
-        self._bus, self._listen, self._standby = bus, listen, standby
+        self.presence, self.listen = presence, listen
+        self._bus, self._standby = bus, standby
         self._state = _State.LISTENING
 
     @property
@@ -52,7 +52,7 @@ class Turn:
             Another monitor does what this one would.
         """
         other = self.presence.other(now)
-        if self._state is _State.LISTENING and uptime >= self._listen:
+        if self._state is _State.LISTENING and uptime >= self.listen:
             if other is not None and not self._standby:
                 raise OccupiedError(
                     f"bus {self._bus}: {other} already; stop it, or let this one take over when it falls silent "

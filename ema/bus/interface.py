@@ -6,17 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import can
 from pydantic import Field
 
 from ema.core.config import Settings, validate
 from ema.core.errors import BusError, ConfigError
 
-from .authenticated import AuthenticatedPort, challenges, session_file_of
 from .codec import default
 from .multicast import GROUP, PORT, MulticastPort
 from .port import RECEIVE_BUFFER, Filters, Port
-from .python_can import PythonCanPort
 from .socketcan import SocketCanPort
 
 AUTO = "auto"
@@ -63,7 +60,7 @@ def parse(text: str) -> BusSettings:
     interface, colon, channel = text.partition(":")
     if colon:
         return BusSettings(interface=interface, channel=channel)
-    if text in can.interfaces.VALID_INTERFACES:
+    if text in OWN or text in _of_python_can():
         return BusSettings(interface=text)
     return BusSettings(interface="socketcan", channel=text)
 
@@ -82,12 +79,13 @@ def open_bus(settings: BusSettings, filters: Filters | None = None, role: str = 
     CAN interface the kernel leaves out the rest before it costs anything. `role` is who this is, a sender of the DBC:
     where frames are authenticated, others are asked in its name.
     """
+    opened = _open if settings.interface != AUTO else _open_best
     key_file = settings.key_file
-    if key_file is not None and filters is not None:
-        filters = [*filters, *challenges(default())]
-    port = _open(settings, filters) if settings.interface != AUTO else _open_best(settings, filters)
     if key_file is None:
-        return port
+        return opened(settings, filters)
+    from .authenticated import AuthenticatedPort, challenges, session_file_of
+
+    port = opened(settings, filters if filters is None else [*filters, *challenges(default())])
     try:
         session_file = settings.session_file or session_file_of(key_file)
         return AuthenticatedPort(port, default(), key_file, session_file, role)
@@ -119,6 +117,10 @@ def _open(settings: BusSettings, filters: Filters | None) -> Port:
             return kind(channel, filters, **given.model_dump())
         except ConfigError as error:
             raise BusError(str(error)) from error
+    import can
+
+    from .python_can import PythonCanPort
+
     options: dict[str, Any] = {"fd": True} if interface != "virtual" else {"protocol": can.CanProtocol.CAN_FD}
     try:
         bus = can.Bus(interface=interface, channel=channel, **{**options, **settings.options})
@@ -127,6 +129,13 @@ def _open(settings: BusSettings, filters: Filters | None) -> Port:
     if filters is not None:
         bus.set_filters([{"can_id": i, "can_mask": mask, "extended": True} for i, mask in filters])
     return PythonCanPort(bus, name)
+
+
+def _of_python_can() -> frozenset[str]:
+    """Names of python-can's interfaces; importing it takes longer than opening a port of our own."""
+    import can
+
+    return frozenset(can.interfaces.VALID_INTERFACES)
 
 
 def _default_channel(interface: str) -> str:

@@ -47,10 +47,6 @@ class Presence:
         self._heard: dict[int, float] = {}  # when last a sign of another was heard, by actuator [s]
         self._uptime = 0
 
-    def filters(self) -> list[tuple[int, int]]:
-        """Filters for `open_bus` that let through what other monitors send."""
-        return self._codec.filters(_MONITOR)
-
     def without(self, frames: np.ndarray, now: float) -> np.ndarray:
         """Take what other monitors sent out of a batch, shape (n,), received at `now` [s]; the rest of it."""
         theirs = (frames["id"] & _FID) == self._fid
