@@ -134,6 +134,12 @@ def _zeros(plant: AxisPlant, outcome: Outcome) -> list[str]:
             out.append(
                 f"{name}: no torque locked to the angle stands out, its angle zero is taken to be that of the others"
             )
+        elif zero.turned:
+            orders = ", ".join(f"{n:g}" for n in zero.turned)
+            out.append(
+                f"{name}: the torque of order {orders} has the other sign than in the records before, as by a "
+                f"neighbour's magnets or a current sensor; a zero {zero.instead:+.4g} rad off would look the same"
+            )
         elif zero.angle:
             orders = ", ".join(f"{n:g}" for n in zero.orders)
             other = f", or by multiples of {zero.period:.4g} rad more" if zero.period < 6.0 else ""

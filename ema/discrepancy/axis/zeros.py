@@ -22,15 +22,22 @@ if TYPE_CHECKING:
     from .plant import AxisPlant
 
 SAME = 0.98  # of the best overlap: a zero that reaches it is as good, the smallest is taken
+TURNED = 0.15  # [rad] of a line, within which all lines lie as they do or turned round, where no zero is off
 STEPS = 64  # of δ in one period of the highest order
 
 
 @dataclass(frozen=True)
 class Zero:
-    """Angle to be added to the positions of a record, found by lines of `orders`; None where nothing tells. [rad]"""
+    """Angle to be added to the positions of a record, found by lines of `orders`; None where nothing tells. [rad]
+
+    `turned`: lines that have the other sign in this record while the zero is the same; a zero that is `instead` off
+    would look alike.
+    """
 
     angle: float | None
     orders: tuple[float, ...] = ()
+    turned: tuple[float, ...] = ()
+    instead: float = 0.0
 
     @property
     def period(self) -> float:
@@ -72,4 +79,10 @@ def _between(reference: dict[float, complex], own: dict[float, complex]) -> Zero
         return Zero(0.0, shared)
     near = good[np.argmin(np.abs(delta[good]))]
     peak = good[np.abs(delta[good] - delta[near]) < math.pi / n.max()]
-    return Zero(float(delta[peak[np.argmax(overlap[peak])]]), shared)
+    found = float(delta[peak[np.argmax(overlap[peak])]])
+    shift = np.angle(np.exp(1j * n * found))
+    away = np.minimum(np.abs(shift), math.pi - np.abs(shift))
+    if bool((away < TURNED).all()):  # by chance in few zeros of all, but in each where a neighbour turns lines round
+        turned = tuple(float(k) for k in n[np.abs(shift) > 0.5 * math.pi])
+        return Zero(0.0, shared, turned, found)
+    return Zero(found, shared)

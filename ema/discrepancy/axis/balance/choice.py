@@ -11,11 +11,13 @@ import numpy as np
 from ema.core.records import Array
 from ema.models.axis_config import LinearAxis
 
+from .agreement import Agreement, against, agreements
+from .apart import apart
 from .attenuation import Corrected, attenuation
 from .course import Course, courses
 from .law import Acting, Law
-from .laws import LINES, laws
-from .regression import Plain, Regression, fitted
+from .laws import LINEAR, LINES, ROTARY, laws, of_base
+from .regression import BY_RECORD, Plain, Regression, fitted
 from .rows import Rows, half_widths, rows
 
 if TYPE_CHECKING:
@@ -29,6 +31,7 @@ SELDOM = 0.05  # share of draws that another law must win to be one that the rec
 CONSTANT = 0.02  # share by which a voltage must change to drive by more than its value
 APART = 0.05  # of a law's size that must stand out of what inertia, dry friction and drag do
 N_WIDTHS = 3  # rounds
+BY_NAME = BY_RECORD.replace(" ", "_")
 N_DRAWS = 400  # of blocks, to see how often a law wins
 
 
@@ -63,6 +66,8 @@ class Balance:
         with the laws found.
     noise : float
         What the sensors' noise leaves.
+    agreements : tuple of Agreement
+        Where several records are given: each coefficient record by record.
     """
 
     model: Regression
@@ -74,11 +79,16 @@ class Balance:
     left_base: float
     left: float
     noise: float
+    agreements: tuple[Agreement, ...] = ()
 
     def confidence(self, term: Term) -> float:
-        """How often the law wins, times its mark over that and what of the rest it may have been taken for."""
+        """How often the law wins, times its mark over that and what of the rest it may have been taken for.
+
+        What records contradict each other in counts against it.
+        """
         rest = term.common * max(self.left - self.noise, 0.0)
-        return term.wins * term.power / (term.power + rest) if term.power > 0.0 else 0.0
+        sure = term.wins * term.power / (term.power + rest) if term.power > 0.0 else 0.0
+        return sure * against(term.law, self.agreements)
 
     def explained(self, left: float) -> float:
         """Share of the drive's torque, as a coefficient of determination."""
@@ -105,10 +115,20 @@ def balance(plant: AxisPlant) -> Balance | None:
             break
         widths = wider if widths is None else {name: max(wider[name], widths[name]) for name in wider}
         found = rows(plant, recorded, widths) or found
-        answer = chosen(found, plain, shown_by(found, list(laws(found.motion, linear=linear))))
+        answer = chosen(found, plain, shown_by(found, list(every_law(found, linear=linear))))
     assert answer is not None
     assert widths is not None
-    return replace(answer, corrected=attenuation(plant, recorded, widths, plain, answer.model))
+    return replace(
+        answer,
+        corrected=attenuation(plant, recorded, widths, plain, answer.model),
+        agreements=tuple(agreements(found, plain, answer.model)),
+    )
+
+
+def every_law(found: Rows, *, linear: bool) -> list[Law]:
+    """Laws that all records share, and each with own coefficients by record."""
+    shared = list(laws(found.motion, linear=linear))
+    return [*shared, *apart(found.motion, shared, of_base(LINEAR if linear else ROTARY))]
 
 
 def _is_given(plant: AxisPlant, recorded: Sequence[Course], found: Rows) -> bool:
@@ -130,7 +150,7 @@ def shown_by(found: Rows, every: Sequence[Law]) -> list[Law]:
         if law.needs_acting:
             out.append(law)
             continue
-        A = np.column_stack(found.of(law, law.columns(m, Acting(m.drive, m.drive, m.drive))))
+        A = np.column_stack(found.of(law, Acting(m.drive, m.drive, m.drive)))
         beside = np.linalg.norm(A - q @ (q.T @ A), axis=0)
         if bool((beside > APART * np.linalg.norm(A, axis=0)).any()):
             out.append(law)
@@ -173,7 +193,7 @@ def _simplest(trials: Sequence[Regression], whole: float) -> Regression | None:
     best = min(trials, key=lambda r: r.loss, default=None)
     if best is None:
         return None
-    held = [r for r in trials if r.laws[-1].family in HOLDS.get(best.laws[-1].family, ())]
+    held = [r for r in trials if r.laws[-1].family in _held(best.laws[-1].family)]
     return next((r for r in held if not _is_needed(best, r, whole)), best)
 
 
@@ -181,7 +201,8 @@ def _trials(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) 
     """The model with one law more: of each family that is not in it the member that fits best."""
     have = {law.key for law in model.laws}
     single = {law.family for law in model.laws if law.family not in LINES}
-    single |= {other for law in model.laws for other in HOLDS.get(law.family, ())}
+    single |= {other for law in model.laws for other in _held(law.family) if other not in LINES}
+    have |= {law.key.removesuffix(BY_RECORD) for law in model.laws}
     members: dict[str, list[Law]] = {}
     for law in every:
         if law.key not in have and law.family not in single:
@@ -192,16 +213,23 @@ def _trials(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) 
 HOLDS = {"spring": ("constant",), "links": ("pendulum",)}  # a spring has its own zero
 
 
+def _held(family: str) -> tuple[str, ...]:
+    """Families that one of another family holds: with own coefficients by record, also those of one for all."""
+    shared = family.removesuffix(BY_RECORD)
+    held = HOLDS.get(shared, ())
+    return held if family == shared else (shared, *held, *(f"{other}{BY_RECORD}" for other in held))
+
+
 def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
     """The member of a family whose columns take most of what is left."""
     if len(members) == 1:
         return members[0]
     q, _ = np.linalg.qr(model.design)
     left = model.left - q @ (q.T @ model.left)
-    columns = [found.of(law, law.columns(found.motion, model.acting)) for law in members]
-    A = np.stack([np.stack(own, axis=1) for own in columns])  # (n_members, n_rows, n_columns)
-    A = A - np.einsum("rk,mkc->mrc", q, np.einsum("rk,mrc->mkc", q, A))
-    gram, b = np.einsum("mrc,mrd->mcd", A, A), np.einsum("mrc,r->mc", A, left)
+    columns = [found.of(law, model.acting) for law in members]
+    A = np.array(columns)  # (n_members, n_columns, n_rows)
+    A -= (A @ q) @ q.T
+    gram, b = A @ A.transpose(0, 2, 1), A @ left
     gains = np.einsum("mc,mcd,md->m", b, np.linalg.pinv(gram, rcond=1e-6, hermitian=True), b)
     return members[int(np.argmax(gains))]
 
@@ -252,10 +280,10 @@ def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequenc
     others = [r for r in _trials(found, plain, without, every) if r.laws[-1].key != law.key]
     rivals: dict[str, Array] = {}
     for r in others:
-        own = r.laws[-1].name
-        if law.family in HOLDS.get(r.laws[-1].family, ()) and not _is_needed(r, model, 0.0):
+        own = r.laws[-1].name.removesuffix(BY_NAME)
+        if law.family in _held(r.laws[-1].family) and not _is_needed(r, model, 0.0):
             continue  # it can do what this law does and more, and need not
-        if own != law.name and (own not in rivals or r.loss < float(rivals[own].sum())):
+        if own != law.name.removesuffix(BY_NAME) and (own not in rivals or r.loss < float(rivals[own].sum())):
             rivals[own] = r.losses
     names, losses = [law.name, *rivals], np.stack([model.losses, *rivals.values()])
     rng = np.random.default_rng(0)

@@ -48,6 +48,8 @@ class Law:
     needs_acting : bool
         Whether its columns depend on what else acts.
     n_columns : int
+    repeats : Law or None
+        The law of which it has the columns once for each record.
     """
 
     family: str
@@ -62,6 +64,7 @@ class Law:
     is_friction: bool = False
     needs_acting: bool = False
     n_columns: int = 1
+    repeats: Law | None = None
 
 
 def one(name: str, **shape: float) -> Values:

@@ -15,6 +15,7 @@ from ema.core.records import Array
 
 from .law import Acting, Columns, Law, Values, one
 from .links import links
+from .regression import BY_RECORD
 from .rows import Motion
 
 N_SPEEDS, N_PLACES, N_ORDERS = 14, 12, 320  # members of a family
@@ -23,7 +24,7 @@ LEAST_TURN = 0.3  # [rad] of travel that shows a sine of the angle apart from a 
 HIGHEST_ORDER = 260.0
 STRETCHES = (0.05, 0.15)  # half widths of a stretch of other friction, of the travel
 TORQUE_LINE, TRAVEL_LINE = "torque line", "line along the travel"
-LINES = (TORQUE_LINE, TRAVEL_LINE)  # families of which several members may act
+LINES = tuple(f"{name}{more}" for name in (TORQUE_LINE, TRAVEL_LINE) for more in ("", BY_RECORD))  # several may act
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,15 @@ class Units:
 
 
 ROTARY, LINEAR = Units("N m", "rad/s", "rad", "torque"), Units("N", "m/s", "m", "force")
+
+
+def of_base(u: Units) -> Mapping[str, str]:
+    """Units of inertia, dry friction and drag."""
+    return {
+        "inertia": "kg" if u is LINEAR else "kg m^2",
+        "dry_friction": u.torque,
+        "viscous_drag": f"{u.torque} s/{u.place}",
+    }
 
 
 def laws(m: Motion, *, linear: bool) -> Iterator[Law]:

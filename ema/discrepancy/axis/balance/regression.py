@@ -13,7 +13,7 @@ from .law import Acting, Law
 from .rows import N_FOLDS, Rows
 
 N_ROUNDS = 6  # of laws that depend on what else acts, which depends on them
-BASE = ("inertia", "dry_friction", "viscous_drag")
+BY_RECORD = " by record"  # in the name of what is fitted once for each
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Regression:
     ----------
     laws : tuple of Law
     base : tuple of str
-        Those of `BASE` that the motions can show.
+        Those of inertia, dry friction and drag that the motions can show.
     design : array, shape (n_rows, n_coefficients)
         Columns of the base, then of the laws.
     coefficients : array, shape (n_coefficients,)
@@ -88,18 +88,27 @@ class Regression:
         return float(np.sum((basis.T @ its) ** 2) / max(float(np.sum(its**2)), 1e-300))
 
     def covariance(self) -> Array:
-        """Of the coefficients, from how blocks disagree (neighbouring rows overlap, and no law is quite right)."""
-        A = self.design
-        bread = np.linalg.pinv(A.T @ A, rcond=1e-12, hermitian=True)
-        scores = np.zeros((self.rows.n_blocks, A.shape[1]))
+        """Of the coefficients, by leaving out one block after the other: rows overlap, and no law is quite right."""
+        size = np.maximum(np.linalg.norm(self.design, axis=0), 1e-300)
+        A, n = self.design / size, self.rows.n_blocks
+        gram, scores = A.T @ A, np.zeros((n, A.shape[1]))
         np.add.at(scores, self.rows.block, A * self.left[:, None])
-        n = self.rows.n_blocks
-        return np.asarray(bread @ (scores.T @ scores) @ bread * n / max(n - 1, 1))
+        moved = np.array([
+            _of_normal(gram - A[own].T @ A[own], scores[b])
+            for b, own in enumerate(self.rows.block == b for b in range(n))
+        ])  # fmt: skip
+        moved = (moved - moved.mean(axis=0)) / size
+        return np.asarray(moved.T @ moved * (n - 1) / max(n, 1))
 
 
-def fitted(rows: Rows, plain: Plain, laws: Sequence[Law]) -> Regression:
-    """Fit the base and `laws`."""
+def fitted(rows: Rows, plain: Plain, laws: Sequence[Law], *, apart: bool = False) -> Regression:
+    """Fit the base and `laws`; the base `apart`: one column for each record."""
     base, columns = _base(rows)
+    if apart:
+        records = rows.motion.records
+        base = tuple(f"{name}{BY_RECORD} {k}" for name in base for k in range(len(records)))
+        of = (np.arange(len(records)) == rows.record[:, None]).astype(float)  # (n_rows, n_records)
+        columns = (columns[:, :, None] * of[:, None, :]).reshape(len(rows.y), -1)
     m = rows.motion
     acting = Acting(m.drive, m.drive, m.drive)
     waits = any(law.needs_acting for law in laws)
@@ -107,8 +116,7 @@ def fitted(rows: Rows, plain: Plain, laws: Sequence[Law]) -> Regression:
         acting = fitted(rows, plain, [law for law in laws if not law.needs_acting]).acting
     for _ in range(N_ROUNDS if waits else 1):
         own = [law.columns(m, acting) for law in laws]
-        integrated = [column for law, part in zip(laws, own, strict=True) for column in rows.of(law, part)]
-        design = np.column_stack([columns, *integrated])
+        design = np.column_stack([columns, *(column for law in laws for column in rows.of(law, acting))])
         coefficients = _solved(design, rows.y)
         acting = _acting(rows, plain, base, laws, own, coefficients)
     left = rows.y - design @ coefficients
@@ -167,9 +175,16 @@ def _acting(
     m = rows.motion
     beyond = m.drive - m.known  # what the plant file takes
     friction = plain.F_d * m.direction + plain.C * m.w
-    values = dict(zip(base, c, strict=False))
-    dissipated = values.get("dry_friction", 0.0) * m.direction + values.get("viscous_drag", 0.0) * m.w
-    load = values.get("inertia", 0.0) * m.a
+
+    def of(name: str) -> Array | float:
+        """Coefficient of a base law along the samples."""
+        own = dict(zip(base, c, strict=False))
+        if name in own or not base or BY_RECORD not in base[0]:
+            return float(own.get(name, 0.0))
+        return np.array([own.get(f"{name}{BY_RECORD} {k}", 0.0) for k in range(len(m.records))])[m.record]
+
+    dissipated = of("dry_friction") * m.direction + of("viscous_drag") * m.w
+    load = of("inertia") * m.a
     at = len(base)
     for law, columns in zip(laws, own, strict=True):
         for column in columns:
@@ -178,5 +193,4 @@ def _acting(
             else:
                 load = load + c[at] * column
             at += 1
-    inertia = values.get("inertia", 0.0) * m.a
-    return Acting(beyond + load + dissipated, beyond - friction + load, beyond - friction + load - inertia)
+    return Acting(beyond + load + dissipated, beyond - friction + load, beyond - friction + load - of("inertia") * m.a)

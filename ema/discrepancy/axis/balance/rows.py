@@ -24,7 +24,7 @@ from .smooth import bumps_at, local_polynomial
 if TYPE_CHECKING:
     from ema.discrepancy.axis.plant import AxisPlant
 
-    from .law import Law
+    from .law import Acting, Law
 
 HALVES = (4, 6, 9, 13, 20, 30, 45, 70, 100, 150, 220, 330)  # of a test function, in samples
 QUIET = 0.1  # noise of the acceleration over its rms from which a test function is wide enough
@@ -45,6 +45,7 @@ class Motion:
     `drive` is the drive's torque; `known` what is left of it to accelerate the axis, by the plant file.
     `direction` is ±1 or, where the axis may rest, 0. `has_position` is False where the position was integrated.
     `other` is angle, speed and acceleration of a neighbouring axis, which is the `neighbour` "inner" or "outer" one.
+    `record` is which of `records` a sample is of.
     """
 
     t: Array
@@ -58,6 +59,8 @@ class Motion:
     static: NDArray[np.bool_]
     other: tuple[Array, Array, Array] = (np.empty(0), np.empty(0), np.empty(0))
     neighbour: str = ""
+    record: NDArray[np.int_] = field(default_factory=lambda: np.empty(0, int))
+    records: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -89,12 +92,15 @@ class Rows:
     half: float
     known: dict[str, list[Array]] = field(default_factory=dict)
 
-    def of(self, law: Law, columns: tuple[Array, ...]) -> list[Array]:
+    def of(self, law: Law, acting: Acting) -> list[Array]:
         """Columns of a law over the rows; those that do not depend on what else acts are integrated once."""
+        if law.repeats is not None:  # no row lies across two records
+            own = self.of(law.repeats, acting)
+            return [column * (self.record == k) for k in range(len(self.motion.records)) for column in own]
         if law.needs_acting:
-            return [self.integrate @ column for column in columns]
+            return [self.integrate @ column for column in law.columns(self.motion, acting)]
         if law.key not in self.known:
-            self.known[law.key] = [self.integrate @ column for column in columns]
+            self.known[law.key] = [self.integrate @ column for column in law.columns(self.motion, acting)]
         return self.known[law.key]
 
     @property
@@ -139,7 +145,8 @@ def rows(plant: AxisPlant, courses: list[Course], halves: dict[str, float] | Non
     if len(alpha) < FEWEST:
         return None
     join = _stacked(matrices, offset)
-    motion = _joined(motions)
+    of_record = np.repeat([names.index(c.record) for c in courses], [len(c.t) for c in courses])
+    motion = replace(_joined(motions), record=of_record, records=tuple(names))
     _, own = np.unique(own, return_inverse=True)
     half = float(np.median(list(widths.values()))) if widths else 0.0
     return Rows(motion, join @ motion.known, join @ motion.drive, alpha, join, own, whole, record, sigma, half)
@@ -228,6 +235,7 @@ def _motion(plant: AxisPlant, model: axis.Model, c: Course, half: float) -> Moti
         if c.position is None:
             w, a, noise = w_own, a_own, own_noise
             theta = np.concatenate(([0.0], np.cumsum(np.diff(c.t) * 0.5 * (w[1:] + w[:-1]))))
+    theta = theta + _zero(plant, c)
     rest = max(SEEN * noise, CREEP * float(np.sqrt(np.mean(w**2))))
     direction = np.where(np.abs(w) > rest, np.sign(w), 0.0)
     i, drive = _current(c, w, model.z)
@@ -245,12 +253,19 @@ def _at_rest(plant: AxisPlant, model: axis.Model, c: Course) -> Motion:
     assert c.position is not None
     assert c.direction is not None
     k_t = float(plant.plant.k_t or 1.0)
-    held = axis.holding(model, c.position, c.direction, c.t)
+    theta = c.position + _zero(plant, c)
+    held = axis.holding(model, theta, c.direction, c.t)
     zero = np.zeros(len(c.t))
     drive = k_t * c.drive
     return Motion(
-        c.t, c.position, zero, zero, drive, drive - k_t * held, c.direction, True, np.ones(len(c.t), bool)
+        c.t, theta, zero, zero, drive, drive - k_t * held, c.direction, True, np.ones(len(c.t), bool)
     )  # fmt: skip
+
+
+def _zero(plant: AxisPlant, c: Course) -> float:
+    """What is to be added to the angles of a record. [rad]"""
+    found = plant.zeros.get(c.record)
+    return (found.angle or 0.0) if found else 0.0
 
 
 def _current(c: Course, w: Array, z: Array) -> tuple[Array, Array]:

@@ -31,10 +31,11 @@ def local_polynomial(t: Array, x: Array, half: int, degree: int) -> Array:
         span = np.maximum(times[rows, -1] - here[:, 0], here[:, 0] - times[rows, 0])[:, None]
         s = (times[rows] - here) / span
         weight = 1.0 - 0.99 * s**2
-        powers = s[:, :, None] ** np.arange(degree + 1)
+        powers = np.stack([s**k for k in range(degree + 1)], axis=2)
         weighted = powers * weight[:, :, None]
-        normal = np.einsum("nwi,nwj->nij", weighted, powers)
-        right = np.einsum("nwi,nw->ni", weighted, values[rows] - x[a : a + CHUNK, None])
+        turned = weighted.transpose(0, 2, 1)
+        normal = turned @ powers
+        right = (turned @ (values[rows] - x[a : a + CHUNK, None])[:, :, None])[:, :, 0]
         c = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
         c[:, 0] += x[a : a + CHUNK]
         factorial = 1.0

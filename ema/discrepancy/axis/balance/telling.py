@@ -10,11 +10,12 @@ from ema.core.records import Array
 from ema.discrepancy.axis.linear import in_metres
 
 from .choice import Balance, Term
+from .telling_records import by_record
 
 INTERVAL = (2.5, 97.5)  # percent
 N_DRAWS = 400
 BELOW = 2.0  # deviations below zero from which a value is implausible
-SURE = 0.9
+SURE, CONTRADICTED = 0.9, 0.1
 NAMES = {"inertia": "inertia", "dry_friction": "dry friction", "viscous_drag": "drag"}
 UNITS = {"inertia": "kg m^2", "dry_friction": "N m", "viscous_drag": "N m s/rad"}
 MADE_BY = {  # what makes a fitted value implausible
@@ -43,6 +44,7 @@ def told(b: Balance, *, linear: bool) -> dict[str, Any]:
         "test_function": _short(2.0 * b.model.rows.half),
         "base": {name: _base(b, k, name, samples, linear) for k, name in enumerate(b.model.base)},
         "terms": [_term(b, term, samples) for term in b.terms],
+        **({"by_record": by_record(b.agreements, b.model.rows.motion.records, linear=linear)} if b.agreements else {}),
     }
 
 
@@ -117,6 +119,8 @@ def sentences(balance: dict[str, Any]) -> list[str]:
     if loop := balance.get("closed_loop"):
         runs = " and ".join(f"the {name} {q['before']:.1%} before, {q['after']:.1%} after" for name, q in loop.items())
         out.append(f"Closed-loop runs over the whole record miss {runs}.")
+    if records := balance.get("by_record"):
+        out.append("Records beside each other: " + "; ".join(own["sentence"] for own in records) + ".")
     implausible = [q["implausible"] for q in (*balance["base"].values(), *balance["terms"]) if "implausible" in q]
     return [*out, *(f"{text[0].upper()}{text[1:]}." for text in implausible)]
 
@@ -130,6 +134,8 @@ def _number(name: str, q: dict[str, Any]) -> str:
 
 
 def _said(term: dict[str, Any]) -> str:
+    if term["name"].endswith("_by_record") and term["confidence"] < CONTRADICTED:
+        return f"what records contradict each other in ({term['name'].removesuffix('_by_record')})"
     q = next(iter(term["parameters"].values()))
     text = f"{term['sentence']} ({q['low']:.3g} … {q['high']:.3g})"
     if term["indistinguishable_from"]:
