@@ -99,6 +99,10 @@ class Findings:
     rejected : list of dict
         What was considered and is not the answer: its ``name``, what faults alone (``before``) and what it (``after``)
         leaves of held-out parts over noise, and ``why``.
+    posterior : list of dict
+        Sets of causes with their probability, likeliest first: ``effects``, ``faults`` above 1 %, ``probability``,
+        ``nats_behind`` the likeliest and ``nats_error``, what other seeds would make of that. Of the sets that were
+        fitted only; empty where none was weighed.
     seeds : dict
         Of the simulations that the answer rests on, where there are any.
     balance : dict
@@ -119,6 +123,7 @@ class Findings:
     unnamed: list[FoundEffect] = field(default_factory=list)
     rest: float = 0.0
     rejected: list[dict[str, Any]] = field(default_factory=list)
+    posterior: list[dict[str, Any]] = field(default_factory=list)
     seeds: dict[str, int] = field(default_factory=dict)
     balance: dict[str, Any] = field(default_factory=dict)
     leading: list[dict[str, Any]] = field(default_factory=list)
@@ -146,6 +151,7 @@ class Findings:
                 "false_alarms_after": g.false_alarms_after,
                 **({"folds": g.folds.as_dict()} if g.folds else {}),
             },
+            **({"posterior": self.posterior} if self.posterior else {}),
             "rejected": self.rejected,
             "tried": self.tried,
             "notes": self.notes,

@@ -13,6 +13,7 @@ from ema.models.actuator import Actuator
 
 from .conditions import as_recorded
 from .cycles import Measured
+from .entrants import as_told, weighed
 from .gear import swinging
 from .growing import beside, growing, said, widened
 from .noise import Noise, Verdict
@@ -120,7 +121,7 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
     alike = [still_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
     if of_each is not None and after.effects:
         after = widened(search, after)
-    findings = told(search, before, after, v, alike)
+    findings = replace(told(search, before, after, v, alike), posterior=as_told(weighed(search, before, after)))
     if findings.verdict == "adequate":
         conditions.extend(path.as_well)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:

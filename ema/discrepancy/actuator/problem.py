@@ -34,6 +34,7 @@ class ActuatorProblem:
     def __init__(self, plant: EmaPlant):
         self.plant = plant
         data = plant.data
+        self.grids = len(plant.noise_steps)
         self.cycles = list(range(data.n_cycles))
         sizes = np.cumsum([0, *(len(data.y[c]) for c in self.cycles)])
         self.at = [slice(int(a), int(b)) for a, b in itertools.pairwise(sizes)]
@@ -48,7 +49,7 @@ class ActuatorProblem:
         tried: dict[str, list[Candidate]] = {}
         for c in candidates(self.plant.plant, self.plant.data, ()):
             tried.setdefault(c.effect, []).append(c)
-        return tuple(_cause(of) for of in tried.values())
+        return tuple(as_cause(of) for of in tried.values())
 
     def records(self, points: Sequence[Point], seeds: range) -> Array:
         """Features of simulated records: all cycles of one have one step of the comparators."""
@@ -64,7 +65,7 @@ class ActuatorProblem:
         return np.array([np.concatenate([at[c] - here[c] for c in of]) for at in there])
 
 
-def _cause(tried: Sequence[Candidate]) -> Cause:
+def as_cause(tried: Sequence[Candidate]) -> Cause:
     """One effect with the parameters of all its candidates; where the later ones are probed, fits begin as well."""
     effect = registry()[tried[0].effect]
     declared = {p.name: p for p in effect.parameters}

@@ -95,6 +95,11 @@ class Problem(Protocol):
         ...
 
     @property
+    def grids(self) -> int:
+        """Grids of integration that take turns with the seeds of `records`; blocks of one record have the same."""
+        ...
+
+    @property
     def faults(self) -> Sequence[Parameter]:
         """Parameters that are free in every hypothesis, each there or not."""
         ...

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .hypothesis import Array, Point, Problem
 
@@ -35,10 +36,19 @@ def seeds(pool: Pool, n: int, first: int = 0) -> range:
 
 @dataclass(frozen=True)
 class Simulated:
-    """Records of one point: features (n_seeds, n_features) and the seeds they were made with."""
+    """Records of one point: features (n_seeds, n_features) and the seeds they were made with.
+
+    `grids` grids take turns with the seeds: what a simulation rounds is alike in all blocks of records of one grid.
+    """
 
     features: Array
     seeds: range
+    grids: int = 1
+
+    @property
+    def grid(self) -> NDArray[np.int64]:
+        """Which grid each record has, (n_seeds,)."""
+        return np.arange(len(self.features)) % self.grids
 
     def refuse_shared(self, other: range) -> None:
         """OwnRecordsError where records were made with seeds of `other`."""
@@ -50,4 +60,4 @@ def simulated(problem: Problem, points: Sequence[Point], pool: Pool, n: int, fir
     """Records of several points, with the same seeds; what honest simulations may differ by is part of their noise."""
     of = seeds(pool, n, first)
     floor = problem.floors * np.array([np.random.default_rng(seed).standard_normal(len(problem.floors)) for seed in of])
-    return [Simulated(features + floor, of) for features in problem.records(points, of)]
+    return [Simulated(features + floor, of, problem.grids) for features in problem.records(points, of)]

@@ -97,6 +97,11 @@ class Statistic:
         d = min(int((s > FAINT * s[0]).sum()), n_records // RECORDS_PER_DIRECTION) if len(s) else 0
         return cls(whitening, u[:, :d])
 
+    def by_block(self, x: Array) -> Array:
+        """What each block of features (n, n_features) adds to the statistics, (n, n_blocks, d)."""
+        white = self.whitening.white(x)
+        return np.stack([white[:, block.at] @ self.basis[block.at] for block in self.whitening.blocks], axis=1)
+
     def __call__(self, x: Array) -> tuple[Array, Array]:
         """Statistics t (..., d) of features (..., n_features), and their squared rest (...)."""
         white = self.whitening.white(x)
@@ -136,17 +141,49 @@ class Prediction:
         n = len(records.features)
         unbiased = n / (n - 1.0)
         centre = records.features.mean(axis=0)
-        t, own = statistic(records.features - centre)
+        own = statistic(records.features - centre)[1]
         mean, rest = statistic(centre - measured)
-        sd = np.sqrt(unbiased * (t**2).mean(axis=0))
-        covariance = shrunk_correlation(np.sqrt(unbiased) * t / sd) * np.outer(sd, sd)
         rest_mean = unbiased * float(own.mean())
         left = max(float(rest) - rest_mean / n, 1e-9)
         rest_variance = unbiased**2 * float(own.var(ddof=1))
-        return cls(mean, (1.0 + 1.0 / n) * covariance, left, rest_mean, rest_variance, n)
+        return cls(mean, _covariance(statistic, records), left, rest_mean, rest_variance, n)
 
     def log_rest(self, law_error: float) -> float:
-        """Log density of the rest: a gamma as wide as the records', stretched by what a law may leave of it."""
+        """Log density of the rest: a gamma as wide as the records', stretched by what a law may leave of it.
+
+        Less than the likeliest counts as that: records hold what honest simulations may differ by at most.
+        """
         stretch = 1.0 + law_error / self.rest_mean
         scale = self.rest_variance / self.rest_mean
-        return float(gamma.logpdf(self.rest, self.rest_mean / scale, scale=scale * stretch))
+        shape = self.rest_mean / scale
+        likeliest = max(shape - 1.0, 0.0) * scale * stretch
+        return float(gamma.logpdf(max(self.rest, likeliest), shape, scale=scale * stretch))
+
+
+def _covariance(statistic: Statistic, records: Simulated) -> Array:
+    """Covariance of what one record differs from the mean of all by, (d, d).
+
+    What is random differs from block to block: covariances of blocks add, and few records tell them. What a grid of
+    integration makes is the same in all blocks, and no record tells its grid.
+    """
+    grids = [records.features[records.grid == g] for g in range(records.grids)]
+    means = np.array([x.mean(axis=0) for x in grids])
+    away = [np.sqrt(len(x) / (len(x) - 1.0)) * (x - m) for x, m in zip(grids, means, strict=True)]
+    parts = statistic.by_block(np.concatenate(away))
+    n_blocks, d = parts.shape[1:]
+    rows = parts.reshape(-1, d)
+    sd = np.sqrt((rows**2).mean(axis=0))
+    n = len(records.features)
+    freedom = (n - records.grids) * n_blocks
+    # an inverse of few rows is too large (Hartlap, Simon and Schneider, Astron. Astrophys. 464, 2007)
+    inverse = (freedom - 1.0) / max(freedom - d - 2.0, 1.0)
+    random = n_blocks * inverse * shrunk_correlation(rows / sd) * np.outer(sd, sd)
+    if records.grids == 1:
+        return np.asarray((1.0 + 1.0 / n) * random)
+    t = statistic(means - means.mean(axis=0))[0]
+    between = t.T @ t / (records.grids - 1.0)
+    L = cholesky(random, lower=True)
+    w, V = np.linalg.eigh(solve_triangular(L, solve_triangular(L, between, lower=True).T, lower=True))
+    own = np.maximum(w - records.grids / n, 0.0)  # less what is random in the means
+    of_grid = L @ (V * own) @ V.T @ L.T
+    return np.asarray((1.0 + 1.0 / n) * random + (1.0 + 1.0 / records.grids) * of_grid)

@@ -198,4 +198,5 @@ class Scale:
 
 
 def _halves(records: Simulated) -> list[Simulated]:
-    return [Simulated(records.features[half::2], records.seeds) for half in (0, 1)]
+    turn = np.arange(len(records.features)) // records.grids  # each half has records of every grid
+    return [Simulated(records.features[turn % 2 == half], records.seeds, records.grids) for half in (0, 1)]

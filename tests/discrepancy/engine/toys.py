@@ -29,6 +29,8 @@ class Toy:
         What a point adds to the features beyond that.
     law : array, optional
         What the record holds that no hypothesis says.
+    of_grid : array, shape (grids, n_features), optional
+        What a grid of integration adds to every record made with it.
     """
 
     columns: dict[str, np.ndarray]
@@ -39,6 +41,8 @@ class Toy:
     bend: Callable[[Point], np.ndarray] | None = None
     law: np.ndarray | float = 0.0
     noise: float = 1.0
+    grids: int = 1
+    of_grid: np.ndarray | float = 0.0
 
     def __post_init__(self) -> None:
         self.n = len(next(iter(self.columns.values())))
@@ -58,6 +62,7 @@ class Toy:
 
     def records(self, points: Sequence[Point], seeds: range) -> np.ndarray:
         noise = np.array([self._noise(np.random.default_rng(seed)) for seed in seeds])
+        noise = noise + (self.of_grid[np.arange(len(seeds)) % self.grids] if self.grids > 1 else 0.0)
         return np.array([self.mean(point) + noise for point in points])
 
     def differences(self, point: Point, points: Sequence[Point], seeds: range) -> np.ndarray:

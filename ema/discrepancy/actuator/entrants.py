@@ -1,0 +1,95 @@
+"""What the search has fitted, weighed by the engine as hypotheses on one scale."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ema.core.names import FAULTS
+from ema.discrepancy.engine.contest import Contest, Entrant, Outcome
+from ema.discrepancy.engine.statistic import Whitening
+
+from .features import Array
+from .fit import K_FREE, columns
+from .noise import SEED, Noise
+from .problem import ActuatorProblem, as_cause
+from .search import Model, Search
+
+RUNS = 1_000  # seeds of a motion's noise, at most
+MOST = 8  # sets of effects that are weighed
+RECORDS = 16  # simulated records of each
+WORTH_A_WORD = 0.01  # a fault
+
+
+def weighed(search: Search, before: Model, after: Model) -> Outcome:
+    """Probabilities of the sets of effects that were tried, and the best hypothesis of each."""
+    search.say("probabilities of what was tried")
+    problem = ActuatorProblem(search.plant)
+    found = entrants(search, before, after)
+    return Contest(problem, found, _whitening(problem, search.noise), RECORDS, search.say).run(found)
+
+
+def as_told(outcome: Outcome) -> list[dict[str, Any]]:
+    """Sets of causes as in findings.json, likeliest first; none where nothing was tried beside faults."""
+    if len(outcome.weighed) < 2:
+        return []
+    best = {w.entrant.names: w for w in outcome.weighed}
+    top = max(w.log_evidence for w in outcome.weighed)
+    return [
+        {
+            "effects": list(entry.causes),
+            "faults": [name for name in FAULTS if best[entry.causes].point[name] > WORTH_A_WORD],
+            "probability": entry.probability,
+            "nats_behind": top - entry.log_evidence,
+            "nats_error": best[entry.causes].error,
+        }
+        for entry in outcome.posterior
+    ]
+
+
+def entrants(search: Search, before: Model, after: Model) -> list[Entrant]:
+    """Faults alone, the answer, and the best model of every other set of effects, those that leave least first."""
+    best: dict[frozenset[str], Model] = {}
+    for m in (*search.tried, before, after):
+        key = frozenset(m.names)
+        if key not in best or m.heldout < best[key].heldout:
+            best[key] = m
+    best |= {frozenset(m.names): m for m in (before, after)}
+    first = [before, *([after] if after is not before else [])]
+    others = sorted((m for m in best.values() if m not in first), key=lambda m: m.heldout)
+    return [entrant(search, m) for m in (*first, *others[: MOST - len(first)])]
+
+
+def entrant(search: Search, model: Model) -> Entrant:
+    """A fitted model with its columns; those of faults that were not free are simulated."""
+    plant, point = search.plant, model.fit.point
+    frees = {f.name: f for f in (*K_FREE, *model.fit.free)}
+    motions = range(plant.n_motions)
+    known = dict(model.fit.columns)
+    missing = [f for f in frees.values() if any((m, f.name) not in known for m in motions)]
+    known |= columns(plant, missing, point, motions)
+    causes = tuple(as_cause([c]) for c in model.effects)
+    names = [*FAULTS, *(p.name for c in causes for p in c.parameters)]
+    for name in names:
+        if name not in frees:  # a parameter that a path has fixed
+            known |= {(m, name): np.zeros_like(known[m, FAULTS[0]]) for m in motions}
+    return Entrant(causes, point, np.stack([_column(search, known, name) for name in names], axis=1))
+
+
+def _column(search: Search, known: dict[tuple[int, str], Array], name: str) -> Array:
+    data, first = search.plant.data, search.plant.first
+    parts = []
+    for c in range(data.n_cycles):
+        motion = int(data.motion[c])
+        dT = data.dT[first[motion]]
+        share = 1.0 if not name.endswith(".per_kelvin") else data.dT[c] / dT if dT else 0.0
+        parts.append(share * known[motion, name])
+    return np.concatenate(parts)
+
+
+def _whitening(problem: ActuatorProblem, noise: Noise) -> Whitening:
+    """The noise that the search has measured, as the engine wants it."""
+    sd = np.concatenate([noise.of(c).sd for c in problem.cycles])
+    factors = {m: of.L for m, of in enumerate(noise.motions)}
+    return Whitening(sd, factors, tuple(problem.blocks), range(SEED, SEED + RUNS))

@@ -1,0 +1,87 @@
+"""Fitted hypotheses on one scale: the true one leads with its size, look-alikes share, none is surer than its noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema.discrepancy.engine.contest import Contest, Entrant, Outcome
+from ema.discrepancy.engine.posterior import p_cause
+from ema.discrepancy.engine.records import Pool, simulated
+from ema.discrepancy.engine.statistic import Prediction, Statistic, Whitening
+
+NAMES = ("a", "b", "c")
+
+
+def entrant(toy, *causes: str, **point: float) -> Entrant:
+    there = tuple(c for c in toy.causes if c.name in causes)
+    parameters = [*toy.faults, *(p for c in there for p in c.parameters)]
+    return Entrant(there, point, np.array([toy.columns[p.name] for p in parameters]).T)
+
+
+def held(toy, *entrants: Entrant, n_records: int = 16) -> Outcome:
+    (white,) = simulated(toy, [{}], Pool.WHITEN, 48)
+    whitening = Whitening.of(white, toy.blocks, toy.floors)
+    return Contest(toy, entrants, whitening, n_records, lambda text: None).run(entrants)
+
+
+def test_the_true_cause_leads_and_its_size_is_within_its_deviations(toys):
+    """Begun a quarter off: what is simulated anew ends at the truth, for a cause and a fault at once."""
+    z = []
+    for seed in range(12):
+        toy = toys.plant(2, NAMES, seed=seed, truth={"a.size": 12.0, "k1": 5.0})
+        others = [entrant(toy, name, **{f"{name}.size": 3.0}) for name in "bc"]
+        outcome = held(toy, entrant(toy, k1=4.0), entrant(toy, "a", **{"a.size": 9.0}, k1=6.0), *others)
+        leader = outcome.weighed[0]
+        assert leader.entrant.names == ("a",)
+        assert sum(e.probability for e in outcome.posterior) == pytest.approx(1.0)
+        sd = dict(zip((p.name for p in leader.parameters), leader.evidence.sd, strict=True))
+        z += [(leader.point[name] - x) / sd[name] for name, x in toy.truth.items()]
+    assert np.std(z) == pytest.approx(1.0, abs=0.45)  # of 24, to 99.9 %
+
+
+def test_causes_that_do_the_same_share_the_probability(toys):
+    toy = toys.plant(1, NAMES, seed=3)
+    toy.columns["b.size"] = toy.columns["a.size"]
+    toy.measured = toy.measured + 12.0 * toy.columns["a.size"]
+    outcome = held(toy, entrant(toy), *(entrant(toy, name, **{f"{name}.size": 12.0}) for name in "ab"))
+    assert [p_cause(outcome.posterior, name) for name in "ab"] == pytest.approx([0.5, 0.5], abs=0.01)
+    assert p_cause(outcome.posterior, "c") == 0.0
+
+
+def test_faults_alone_stand_where_they_do_it(toys):
+    toy = toys.plant(2, NAMES, seed=5, truth={"k2": 8.0})
+    outcome = held(toy, entrant(toy, k2=8.0), entrant(toy, "a", k2=8.0), entrant(toy, "a", "b", k2=8.0))
+    assert outcome.posterior[0].causes == ()
+    assert outcome.posterior[0].probability > 0.8
+    assert outcome.weighed[0].evidence.p_fault == pytest.approx([0.0, 1.0], abs=0.3)
+
+
+def test_a_cancelling_pair_is_not_bought(toys):
+    """It fits better by far; what a law may leave is the same for all."""
+    rng = np.random.default_rng([12, 1])
+    toy = toys.plant(1, ("true", "large", "larger"), seed=12, usual=100.0)
+    column = toy.columns["true.size"]
+    form, far = rng.standard_normal((2, toy.n)) * np.linalg.norm(column) / np.sqrt(toy.n)
+    toy.columns["large.size"], toy.columns["larger.size"] = 10.0 * far + column + 0.05 * form, 10.0 * far
+    toy.measured = toy.measured + 100.0 * (column + 0.05 * form)
+    one = entrant(toy, "true", **{"true.size": 100.0})
+    two = entrant(toy, "large", "larger", **{"large.size": 100.0, "larger.size": -100.0})
+    assert held(toy, entrant(toy), one, two).posterior[0].causes == ("true",)
+
+
+def test_what_a_grid_makes_of_all_blocks_is_part_of_the_noise(toys):
+    """The covariance of few records, block by block, is that of many whole ones; of the grid nothing averages out."""
+    rng = np.random.default_rng(11)
+    of_grid = 2.0 * rng.standard_normal((4, 24))
+    toy = toys.plant(1, NAMES, seed=1, grids=4, of_grid=of_grid)
+    (white,) = simulated(toy, [{}], Pool.WHITEN, 400)
+    whitening = Whitening.of(white, toy.blocks, toy.floors)
+    statistic = Statistic.of(whitening, whitening.white(np.array(list(toy.columns.values()))).T, 48)
+    (many,) = simulated(toy, [{}], Pool.TEST, 4000)
+    true = np.cov(statistic(many.features)[0].T)
+    (few,) = simulated(toy, [{}], Pool.PREDICT, 64)
+    found = Prediction.of(statistic, few, toy.measured).covariance
+    ratio = np.sort(np.linalg.eigvals(np.linalg.solve(true, found)).real)
+    assert ratio[0] > 0.5
+    assert ratio[-1] < 2.5  # of 64 records and 4 grids
