@@ -69,7 +69,7 @@ def examined(
         "parameter_errors": {p: found[p]["value"] / x - 1.0 for p, x in true.items() if x},
         "z": {p: (found[p]["value"] - x) / sd[p] for p, x in true.items() if sd[p] > 0.0},
         "covered": {p: found[p]["low"] <= x <= found[p]["high"] for p, x in true.items()}, **gain["heldout"],
-        "k_after": gain["k_after"],
+        "k_after": gain["k_after"], "posterior": findings.get("posterior", [])[:5],
         "err_k_before": _err_k(gain["k_before"], k), "err_k_after": _err_k(gain["k_after"], k),
         "false_alarms": [gain["false_alarms_before"], gain["false_alarms_after"]], "cpu_s": time.process_time() - begun,
         "tried": findings["tried"][:8], "said": findings["structure"].get("sentences", []) + findings["notes"],

@@ -4,6 +4,7 @@ Resumable: every trial is a line of the results file, and a trial that is there 
 line is never replaced, and a file with lines of another commit, or of a changed working tree, is refused.
 
     python -m benchmarks.frozen --trials 300 --out var/frozen.jsonl
+    python -m benchmarks.frozen --render var/frozen.jsonl
 """
 
 from __future__ import annotations
@@ -11,22 +12,16 @@ from __future__ import annotations
 import hashlib
 import json
 import subprocess
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
-from scipy.stats import beta
 
 from benchmarks import strata
+from benchmarks.frozen_table import MixedCommitsError, of_one_commit, table
 
 ROOT = Path(__file__).resolve().parents[1]
-CONFIDENT = 0.9
-
-
-class MixedCommitsError(Exception):
-    """Rows of several commits, or of a changed working tree, are not one experiment."""
 
 
 def commit() -> str:
@@ -41,16 +36,6 @@ def seed(commit: str, stratum: str, trial: int) -> int:
     return int.from_bytes(digest[:4], "big")
 
 
-def of_one_commit(rows: Iterable[Mapping[str, Any]]) -> str:
-    """The commit of all rows; MixedCommitsError where there is none."""
-    commits = sorted({str(row.get("commit")) for row in rows})
-    if len(commits) != 1:
-        raise MixedCommitsError(f"rows of {len(commits)} commits ({', '.join(c[:9] for c in commits)}): must be of one")
-    if commits[0].endswith("+") or commits[0] == "None":
-        raise MixedCommitsError(f"rows of {commits[0]}: a changed working tree cannot be repeated; commit first")
-    return commits[0]
-
-
 def _git(*words: str) -> str:
     return subprocess.run(["git", *words], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
 
@@ -60,42 +45,13 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
 
 
-def missing(n: int, done: Iterable[Mapping[str, Any]]) -> Iterator[tuple[str, int]]:
+def missing(of: Mapping[str, int], done: Iterable[Mapping[str, Any]]) -> Iterator[tuple[str, int]]:
     """Strata and numbers of the trials that are not there, in turn, so that an unfinished run has some of each."""
     there = {(row["stratum"], row["number"]) for row in done}
-    of = strata.counts(n)
     for number in range(max(of.values())):
         for stratum, count in of.items():
             if number < count and (stratum, number) not in there:
                 yield stratum, number
-
-
-def table(found: list[dict[str, Any]]) -> str:
-    """The results of one commit by stratum, with 95 % intervals; MixedCommitsError where they are of several."""
-    lines = [f"commit {of_one_commit(found)}, {len(found)} trials"]
-    for stratum in dict.fromkeys(row["stratum"] for row in found):
-        these = [row for row in found if row["stratum"] == stratum]
-        seen = [row for row in these if row["outcome"] != "refused"]
-        good = sum(row["outcome"] in ("right", "in set") for row in seen)
-        wrong = sum(row["outcome"] == "wrong" and max(row["confidence"], default=0.0) >= CONFIDENT for row in seen)
-        lines.append(
-            f"{stratum:20s} right or in set: {rate(good, len(seen))}; confidently wrong: {rate(wrong, len(seen))}; "
-            f"refused {len(these) - len(seen)}"
-        )
-    seen = [row for row in found if row["outcome"] != "refused"]
-    inside = [x for row in seen for x in row["covered"].values()]
-    invented = sum(any(k > 0.01 and true == 0.0 for k, true in zip(r["k_after"], r["k"], strict=True)) for r in seen)
-    lines.append(f"95 % intervals that hold the truth: {rate(sum(inside), len(inside))}")
-    lines.append(f"trials with a fault above 1 % that is not there: {rate(invented, len(seen))}")
-    cpu = [row["cpu_s"] for row in seen] or [np.nan]
-    lines.append(f"processor time: median {np.median(cpu):.0f} s, 99 %: {np.quantile(cpu, 0.99):.0f} s")
-    return "\n".join(lines)
-
-
-def rate(count: int, n: int) -> str:
-    """A share with its interval of 95 % (Jeffreys)."""
-    low, high = (float(x) for x in beta.interval(0.95, count + 0.5, n - count + 0.5))
-    return f"{count} of {n} ({low:.1%} to {high:.1%})"
 
 
 def begun(out: Path) -> tuple[list[dict[str, Any]], str]:
@@ -109,30 +65,73 @@ def begun(out: Path) -> tuple[list[dict[str, Any]], str]:
     return found, here
 
 
-@click.command()
-@click.option("--trials", default=300, show_default=True, help="of all strata together")
-@click.option("--threads", default=2, show_default=True)
-@click.option("--out", type=click.Path(path_type=Path), default=Path("var/frozen.jsonl"), show_default=True)
-def main(trials: int, threads: int, out: Path) -> None:
-    """Run the trials of this commit that are missing, and print the table."""
-    from benchmarks.discrepancy import examined
+def render(rows_file: Path, page: Path | None) -> str:
+    """The table of a file of rows; put into the page's block of that file where one is given."""
+    rows = read_rows(rows_file)
+    try:
+        text = table(rows)
+    except MixedCommitsError as error:
+        raise click.ClickException(f"{rows_file}: {error}") from error
+    if page is not None:
+        page.write_text(with_table(page.read_text(encoding="utf-8"), rows_file.name, text), encoding="utf-8")
+    return text
 
+
+def with_table(page: str, name: str, text: str) -> str:
+    """A page with the table in its block of that name; ClickException where it has none."""
+    begin, end = f"<!-- frozen {name} -->", "<!-- end -->"
+    before, found, after = page.partition(begin)
+    if not found or end not in after:
+        raise click.ClickException(f"the page has no block {begin} … {end}")
+    return f"{before}{begin}\n{text}\n{end}{after.partition(end)[2]}"
+
+
+def run(out: Path, of: Mapping[str, int], trial: Callable[[str, int, int], dict[str, Any]]) -> None:
+    """Run the trials of this commit that are missing, one line each, and print the table."""
     found, here = begun(out)
-    for stratum, number in missing(trials, found):
+    for stratum, number in missing(of, found):
         s = seed(here, stratum, number)
-        t = strata.drawn(stratum, number, s)
-        row = {
-            "commit": here, "stratum": stratum, "number": number, "seed": s, "case": t.case, "plant": t.plant,
-            "record": t.record,
-            **examined(
-                t.actuator, t.case, t.values, t.k, t.n_cycles, s % 100_000, t.motions, t.bench, threads, t.spoil
-            ),
-        }  # fmt: skip
+        row = {"commit": here, "stratum": stratum, "number": number, "seed": s, **trial(stratum, number, s)}
         found.append(row)
         with out.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
-        click.echo(f"{stratum} {number} ({t.case}, {t.plant}): {row['outcome']} {row.get('named')}", err=True)
+        told = f"{stratum} {number} ({row['case']}, {row['plant']}): {row['outcome']} {row.get('named')}"
+        click.echo(told, err=True)
     click.echo(table(found))
+
+
+def command(main: Callable[..., None]) -> click.Command:
+    """The options that every frozen run has."""
+    options = (
+        click.option("--trials", default=300, show_default=True, help="of all strata together"),
+        click.option("--threads", default=2, show_default=True),
+        click.option("--out", type=click.Path(path_type=Path), help="file of the rows"),
+        click.option("--render", "rows_file", type=click.Path(path_type=Path, exists=True),
+                     help="print the table of this file, and run nothing"),
+        click.option("--into", type=click.Path(path_type=Path, exists=True),
+                     help="with --render: put the table into this page's block of the file"),
+    )  # fmt: skip
+    for option in options:
+        main = option(main)
+    return click.command()(main)
+
+
+@command
+def main(trials: int, threads: int, out: Path | None, rows_file: Path | None, into: Path | None) -> None:
+    """Run the trials of this commit that are missing, and print the table."""
+    if rows_file is not None:
+        click.echo(render(rows_file, into))
+        return
+    run(out or Path("var/frozen.jsonl"), strata.counts(trials), lambda *of: _trial(*of, threads))
+
+
+def _trial(stratum: str, number: int, s: int, threads: int) -> dict[str, Any]:
+    from benchmarks.discrepancy import examined
+
+    t = strata.drawn(stratum, number, s)
+    bench = (t.n_cycles, s % 100_000, t.motions, t.bench, threads, t.spoil)
+    told = {"case": t.case, "plant": t.plant, "record": t.record, "effects": list(strata.hidden_effects(t.case))}
+    return {**told, **examined(t.actuator, t.case, t.values, t.k, *bench)}
 
 
 if __name__ == "__main__":

@@ -106,6 +106,11 @@ STRATA = {
 }  # fmt: skip
 
 
+def hidden_effects(case: str) -> tuple[str, ...]:
+    """Effects of the library that a case hides."""
+    return cases.case(case).effects
+
+
 def counts(n: int) -> dict[str, int]:
     """How many trials of each stratum `n` trials are, at least one."""
     return {name: max(1, round(share * n)) for name, share in STRATA.items()}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from benchmarks import frozen, strata
+from benchmarks import frozen, frozen_table, strata
 from ema.models import hf
 
 HEAD = "a" * 40
@@ -26,8 +26,8 @@ def test_seeds_follow_from_the_commit_and_the_trial():
     [([HEAD, "b" * 40], "2 commits"), ([HEAD + "+"], "commit first"), ([None], "cannot be repeated")],
 )
 def test_rows_of_several_commits_or_of_a_changed_tree_make_no_table(commits, says):
-    with pytest.raises(frozen.MixedCommitsError, match=says):
-        frozen.table([{"commit": c} for c in commits])
+    with pytest.raises(frozen_table.MixedCommitsError, match=says):
+        frozen_table.table([{"commit": c} for c in commits])
 
 
 def test_a_file_of_another_commit_is_refused_before_anything_is_run(tmp_path):
@@ -40,10 +40,11 @@ def test_a_file_of_another_commit_is_refused_before_anything_is_run(tmp_path):
 
 
 def test_an_unfinished_run_goes_on_where_it_ended():
-    whole = list(frozen.missing(60, []))
-    assert len(whole) == sum(strata.counts(60).values())
+    of = strata.counts(60)
+    whole = list(frozen.missing(of, []))
+    assert len(whole) == sum(of.values())
     done = [{"stratum": s, "number": n} for s, n in whole[:17]]
-    assert list(frozen.missing(60, done)) == whole[17:]
+    assert list(frozen.missing(of, done)) == whole[17:]
 
 
 def test_every_effect_and_every_kind_outside_the_library_has_its_turn():

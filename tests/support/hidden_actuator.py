@@ -130,6 +130,8 @@ class Flaws(NamedTuple):
     weak_leg: float = 0.0  # share of switching commands to "up" that leg B ignores, until the next control tick
     inertia: float = 0.0  # relative change of the rotor's inertia
     speed_gain: float = 0.0  # relative change of the speed loop's gain
+    bristle: float = 0.0  # [rad] friction has a memory: bristles give way so far before they slide (LuGre)
+    integral: float = 0.0  # [1/s] the speed loop integrates its error too
 
 
 class Bench(NamedTuple):
@@ -207,6 +209,7 @@ def _run(q, f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, 
     T = TICK * (1.0 + f.clock_skew)
     dt = T / substeps
     I_ref, last_error = 0.0, 0.0
+    bent, summed = 0.0, 0.0  # bristles' deflection [rad]; integral of the speed loop's error [rad]
     wishes, at = np.zeros((64, 3)), 0
     draw, deaf = 0, -1
     for tick in range(n):
@@ -235,7 +238,11 @@ def _run(q, f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, 
         lag = command[tick] - (log_u[lower] + (max(late_u, 0.0) - lower) * (log_u[upper] - log_u[lower]))
         if f.deadband > 0.0:
             lag = 0.0 if abs(lag) < f.deadband else lag - math.copysign(f.deadband, lag)
-        wanted = min(max(K_w * (K_p * lag - seen_w), -I_max), I_max)
+        slow = K_p * lag - seen_w
+        wanted = K_w * (slow + f.integral * summed)
+        if abs(wanted) < I_max:
+            summed += T * slow
+        wanted = min(max(wanted, -I_max), I_max)
         if f.slew > 0.0:
             wanted = min(max(wanted, I_ref - f.slew * T), I_ref + f.slew * T)
         I_ref = wanted
@@ -330,14 +337,20 @@ def _run(q, f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, 
             if f.bump != 0.0 and abs(theta_u - f.bump_centre) < f.bump_width:
                 factor *= 1.0 + 0.5 * f.bump * (1.0 + math.cos(math.pi * (theta_u - f.bump_centre) / f.bump_width))
             extra = f.drag if f.drag > 0.0 and (now / f.drag_period) % 1.0 < 0.35 else 0.0
-            if w == 0.0:
+            if f.bristle > 0.0:  # Canudas de Wit et al., IEEE Trans. Autom. Control 40, 1995
+                level = factor * (F_d + (F_s - F_d) * math.exp(-((w / 2.0) ** 2))) + extra
+                stiffness = level / f.bristle
+                give = w - abs(w) * bent / f.bristle
+                bent += dt * give
+                net = drive - stiffness * bent - 0.3 * math.sqrt(stiffness * J) * give
+            elif w == 0.0:
                 hold = F_s * factor + extra
                 net = 0.0 if abs(drive) <= hold else drive - math.copysign(hold, drive)
             else:
                 slide = F_d * factor * (1.0 + f.stribeck * math.exp(-((w / f.stribeck_speed) ** 2))) + extra
                 net = drive - math.copysign(slide, w)
             faster = w + dt / J * net
-            if faster * w < 0.0:
+            if faster * w < 0.0 and f.bristle == 0.0:
                 faster = 0.0
             theta += dt * faster
             end = GR * (stop + b)

@@ -155,6 +155,8 @@ CASES: dict[str, Case] = {
     "shaker": Case(_one("shaker", 0.004, 0.015), outside=True),
     "weak leg": Case(_one("weak_leg", 0.01, 0.1), outside=True),
     "inertia": Case(_one("inertia", 0.03, 0.3), ("inertia",), parameters={"inertia.change": lambda f: f["inertia"]}),
+    "bristles": Case(_one("bristle", 0.02, 0.15), outside=True),
+    "integral action": Case(_one("integral", 10.0, 60.0), outside=True),
     "speed loop's gain": Case(_one("speed_gain", -0.3, -0.1), outside=True),
 }  # fmt: skip
 

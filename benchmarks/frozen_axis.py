@@ -1,0 +1,76 @@
+"""Trials of the axis plant of one commit: as `benchmarks.frozen`, with the strata of `strata_axis`.
+
+python -m benchmarks.frozen_axis --trials 200 --out var/frozen_axis.jsonl
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from benchmarks import frozen, strata_axis
+from ema.core.errors import RecordError
+from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.wording import findings
+from ema.discrepancy.findings import Findings
+from ema.models.axis_config import LinearAxis, RotaryAxis
+
+
+@frozen.command
+def main(trials: int, threads: int, out: Path | None, rows_file: Path | None, into: Path | None) -> None:
+    """Run the trials of this commit that are missing, and print the table."""
+    if rows_file is not None:
+        click.echo(frozen.render(rows_file, into))
+        return
+    out = out or Path("var/frozen_axis.jsonl")
+    frozen.run(out, strata_axis.counts(trials), lambda *of: trial(strata_axis.drawn(*of), threads))
+
+
+def trial(t: strata_axis.Trial, threads: int) -> dict[str, Any]:
+    """Look for what a trial hides, and lay what is found beside it."""
+    told = {"case": t.case, "plant": t.plant, "effects": list(t.effects), "hidden": t.truth}
+    model = LinearAxis if t.plant_file.get("motion") == "linear" else RotaryAxis
+    begun = time.process_time()
+    try:
+        plant = AxisPlant(model.model_validate(t.plant_file), [t.record], n_threads=threads)
+        found = findings(plant, examined(plant))
+    except RecordError as error:
+        return {**told, "outcome": "refused", "said": [str(error)]}
+    said = found.as_dict()
+    quantities = {f"{e.name}.{name}": q for e in found.effects for name, q in e.parameters.items()}
+    true = {name: x for name, x in t.truth.items() if name in quantities and name in strata_axis.EXACT}
+    sd = {name: (quantities[name].high - quantities[name].low) / 3.92 for name in true}
+    return {
+        **told, "outcome": outcome(t, found), "verdict": found.verdict,
+        "named": [[e.name, *e.indistinguishable_from] for e in found.effects],
+        "confidence": [e.confidence for e in found.effects],
+        "z": {name: (quantities[name].value - x) / sd[name] for name, x in true.items() if sd[name] > 0.0},
+        **said["gain"]["heldout"], "cpu_s": time.process_time() - begun,
+        "said": said["structure"].get("sentences", []),
+    }  # fmt: skip
+
+
+def outcome(t: strata_axis.Trial, found: Findings) -> str:
+    """How the finder did: right, in set, wrong, missed."""
+    sets = [{e.name, *e.indistinguishable_from} for e in found.effects]
+    wanted = set(t.effects)
+    if not wanted and t.case in strata_axis.OUTSIDE:
+        said = "right" if found.verdict == "unexplained" and not sets else "wrong"
+        return "missed" if found.verdict == "adequate" else said
+    if not wanted:
+        return "right" if found.verdict == "adequate" else "wrong"
+    if not sets:
+        return "missed"
+    if not all(s & wanted for s in sets):
+        return "wrong"
+    if not all(any(name in s for s in sets) for name in wanted):
+        return "missed"
+    return "right" if all(len(s) == 1 for s in sets) else "in set"
+
+
+if __name__ == "__main__":
+    main()

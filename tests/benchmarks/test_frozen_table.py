@@ -1,0 +1,121 @@
+"""The table of a frozen run says what its rows say, and the page shows it as it is rendered."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from benchmarks import frozen, frozen_table
+
+HEAD = "a" * 40
+ROOT = frozen.ROOT
+PAGE = ROOT / "docs" / "discrepancy-trials.md"
+BLOCK = re.compile(r"<!-- frozen (\S+) -->\n(.*?)\n<!-- end -->", re.S)
+
+
+def row(number=0, **changed):
+    """A row of a trial in which a spring was hidden and found."""
+    plain = {
+        "commit": HEAD, "stratum": "one effect", "number": number, "case": "spring_load", "effects": ["spring_load"],
+        "outcome": "right", "verdict": "explained", "visible": None, "named": [["spring_load"]], "confidence": [0.97],
+        "z": {"spring_load.stiffness": 0.3}, "err_before": 0.1, "err_after": 0.01, "noise_floor": 0.01,
+        "k": [0.0] * 6, "k_after": [0.0] * 6, "cpu_s": 30.0,
+    }  # fmt: skip
+    return {**plain, **changed}
+
+
+def cells(text, what):
+    """The row of a table that begins with `what`."""
+    (line,) = (line for line in text.splitlines() if line.startswith(f"| {what}"))
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+def test_probabilities_that_are_true_lie_within_the_intervals_of_their_bins():
+    rng = np.random.default_rng(24)
+    print("seed 24")
+    p = rng.random(4000)
+    for _, stated, right in frozen_table.reliability([(x, bool(rng.random() < x)) for x in p]):
+        low, high = (float(x) for x in re.findall(r"([\d.]+)%", right))
+        assert low - 1.0 <= 100.0 * float(stated) <= high + 1.0
+
+
+def test_one_bit_of_confidence_shows_as_one_bin_and_as_too_sure():
+    answers = [(0.99, j % 4 > 0) for j in range(100)]
+    rows = frozen_table.reliability(answers)
+    assert [right for _, _, right in rows[:3]] == ["none"] * 3
+    assert rows[3][2].startswith("75 of 100")
+
+
+def test_intervals_are_counted_at_three_levels():
+    z = np.random.default_rng(3).standard_normal(4000)
+    for p, (_, share) in zip((0.5, 0.9, 0.95), frozen_table.coverage(z.tolist()), strict=True):
+        count, n = map(int, re.match(r"(\d+) of (\d+)", share).groups())
+        assert count / n == pytest.approx(p, abs=0.03)
+
+
+def test_an_effect_that_is_not_there_beside_one_that_is_counts_as_confidently_wrong():
+    extra = row(1, named=[["spring_load"], ["cogging"]], confidence=[0.97, 0.95])
+    text = frozen_table.table([row(), extra])
+    assert cells(text, "confidently wrong")[1].startswith("1 of 2")
+
+
+def test_what_cannot_be_seen_is_not_missed_and_what_can_is():
+    hidden = {"outcome": "missed", "verdict": "adequate", "named": [], "confidence": [], "z": {}}
+    text = frozen_table.table([row(), row(1, visible=1.05, **hidden), row(2, visible=3.0, **hidden)])
+    assert cells(text, "named, or in a set that holds")[1].startswith("1 of 2")
+    assert cells(text, "hidden and not to be seen")[1] == "1 of 3"
+
+
+def test_a_fault_that_is_not_there_and_an_explanation_that_leaves_much_are_counted():
+    bad = row(1, k_after=[0.0, 0.0, 0.02, 0.0, 0.0, 0.0], err_after=0.013)
+    text = frozen_table.table([row(), bad])
+    assert cells(text, "trials with a fault")[1].startswith("1 of 2")
+    assert cells(text, "explained with more")[1].startswith("1 of 2")
+
+
+def test_the_first_set_of_the_posterior_has_a_diagram_of_its_own():
+    first = {"effects": ["spring_load", "cogging"], "probability": 0.9}
+    text = frozen_table.table([row(posterior=[first])])
+    assert "The same of the first set of the posterior" in text
+    assert cells(text.split("posterior")[1], "0.8 to 0.95")[2].startswith("0 of 1")
+
+
+def test_rows_as_they_were_first_written_are_rendered():
+    """They name their case only, and have no posterior."""
+    old = {name: x for name, x in row(case="spring_load on a free user").items() if name != "effects"}
+    assert cells(frozen_table.table([old]), "named, or in a set that holds")[1].startswith("1 of 1")
+
+
+def test_a_file_is_rendered_without_a_run_and_mixed_commits_are_refused(tmp_path):
+    good, mixed = tmp_path / "good.jsonl", tmp_path / "mixed.jsonl"
+    good.write_text(json.dumps(row()) + "\n")
+    mixed.write_text(json.dumps(row()) + "\n" + json.dumps(row(commit="b" * 40)) + "\n")
+    done = CliRunner().invoke(frozen.main, ["--render", str(good)])
+    assert done.exit_code == 0
+    assert "1 trials" in done.output
+    refused = CliRunner().invoke(frozen.main, ["--render", str(mixed)])
+    assert refused.exit_code == 1
+    assert "must be of one" in refused.output
+
+
+def test_a_page_without_the_block_is_refused_and_left_as_it_was(tmp_path):
+    rows, page = tmp_path / "rows.jsonl", tmp_path / "page.md"
+    rows.write_text(json.dumps(row()) + "\n")
+    page.write_text("nothing here")
+    assert CliRunner().invoke(frozen.main, ["--render", str(rows), "--into", str(page)]).exit_code == 1
+    assert page.read_text() == "nothing here"
+    page.write_text("before <!-- frozen rows.jsonl -->\nold\n<!-- end --> after")
+    assert CliRunner().invoke(frozen.main, ["--render", str(rows), "--into", str(page)]).exit_code == 0
+    assert page.read_text().startswith("before <!-- frozen rows.jsonl -->\nCommit")
+    assert page.read_text().endswith("<!-- end --> after")
+
+
+def test_the_page_shows_the_tables_of_the_rows_that_are_kept():
+    blocks = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
+    assert blocks
+    for name, text in blocks:
+        assert text == frozen.render(ROOT / "benchmarks" / "trials" / name, None)
