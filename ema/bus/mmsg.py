@@ -45,6 +45,9 @@ _FD_FLAGS = np.array(
     ],
     np.uint8,
 )
+_MOST_DATA = np.array([8, fr.MAX_DATA], np.uint8)  # bytes, of a classic and of a CAN FD frame
+_WITHIN = np.where(np.arange(fr.MAX_DATA) < np.arange(fr.MAX_DATA + 1)[:, None], np.uint8(0xFF), np.uint8(0))
+_S_NS = np.uint64(1_000_000_000)
 
 
 class _Iovec(ctypes.Structure):
@@ -97,6 +100,7 @@ class _Control(ctypes.Structure):
     _fields_ = [("time", _TimeControl), ("drop", _DropControl)]
 
 
+_STAMPED = np.array([socket.SOL_SOCKET, SO_TIMESTAMPNS], np.int32).view(np.uint8)  # level and kind of _TimeControl
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
@@ -114,12 +118,16 @@ class Received(NamedTuple):
 
 
 class Batch:
-    """Buffers for MAX_BATCH frames and the headers that point at them."""
+    """Buffers for MAX_BATCH frames and the headers that point at them: to receive or to send, not both."""
 
     def __init__(self) -> None:
         self.raw = np.zeros(MAX_BATCH, CANFD_FRAME)
-        self._control = np.zeros(MAX_BATCH, np.dtype(_Control))
-        self._control_bytes = self._control.view(np.uint8)  # cleared field by field, it would cost ten times as much
+        control = np.zeros(MAX_BATCH, np.dtype(_Control))
+        # Cleared and copied as plain bytes: field by field, it would cost ten times as much.
+        self._control_bytes = control.view(np.uint8).reshape(MAX_BATCH, -1)
+        time, self._drop = control["time"], control["drop"]
+        self._seconds, self._nanoseconds = (time[name].view(np.uint64) for name in ("seconds", "nanoseconds"))
+        self._kind_of_time = self._control_bytes[:, _TimeControl.level.offset : _TimeControl.seconds.offset]
         iovecs = np.zeros(MAX_BATCH, np.dtype(_Iovec))
         iovecs["base"] = self.raw.ctypes.data + FD_SIZE * np.arange(MAX_BATCH)
         iovecs["size"] = FD_SIZE
@@ -128,25 +136,30 @@ class Batch:
         message = self._message = self._headers["message"]
         message["iov"] = iovecs.ctypes.data + iovecs.itemsize * np.arange(MAX_BATCH)
         message["n_iov"] = 1
-        self._control_at = self._control.ctypes.data + self._control.itemsize * np.arange(MAX_BATCH)
+        message["control"] = control.ctypes.data + control.itemsize * np.arange(MAX_BATCH)
+        message["control_size"] = control.itemsize
+        self._header_bytes = self._headers.view(np.uint8).reshape(MAX_BATCH, -1)
+        self._clean = self._header_bytes.copy()
+        self._sizes, self._address = self._headers["size"], ctypes.c_void_p(self._headers.ctypes.data)
+        self._n_used = 0  # headers and controls that the last call has written to
 
     def receive(self, fileno: int, n_most: int = MAX_BATCH) -> Received:
         """Frames that wait at a non-blocking socket, up to `n_most`; OSError from the kernel, EAGAIN for none."""
-        self._control_bytes[: n_most * self._control.itemsize] = 0
-        self._message["control"][:n_most] = self._control_at[:n_most]
-        self._message["control_size"][:n_most] = self._control.itemsize
-        n = _libc.recvmmsg(fileno, ctypes.c_void_p(self._headers.ctypes.data), n_most, 0, None)
+        used = self._n_used
+        self._control_bytes[:used] = 0
+        self._header_bytes[:used] = self._clean[:used]
+        self._n_used = 0
+        n = _libc.recvmmsg(fileno, self._address, n_most, 0, None)
         if n < 0:
             raise _error()
-        time, drop = self._control["time"][:n], self._control["drop"][:n]
-        t_ns = np.where(
-            (time["level"] == socket.SOL_SOCKET) & (time["kind"] == SO_TIMESTAMPNS),
-            time["seconds"].astype(np.uint64) * np.uint64(1_000_000_000) + time["nanoseconds"].astype(np.uint64),
-            np.uint64(0),
-        )
-        last = drop[n - 1]
-        told = last["level"] == socket.SOL_SOCKET and last["kind"] == SO_RXQ_OVFL
-        return Received(self.raw[:n], self._headers["size"][:n], t_ns, int(last["n_dropped"]) if told else 0)
+        self._n_used = n
+        t_ns = self._seconds[:n] * _S_NS + self._nanoseconds[:n]
+        untold = self._kind_of_time[:n] != _STAMPED
+        if untold.any():
+            t_ns[untold.any(axis=1)] = 0
+        drop = self._drop[n - 1]
+        told = drop["level"] == socket.SOL_SOCKET and drop["kind"] == SO_RXQ_OVFL
+        return Received(self.raw[:n], self._sizes[:n], t_ns, int(drop["n_dropped"]) if told else 0)
 
     def send(self, fileno: int, frames: np.ndarray) -> int:
         """Send up to MAX_BATCH frames, FRAME_DTYPE; how many were taken, at least one, else OSError."""
@@ -154,7 +167,7 @@ class Batch:
         self._iovecs["size"][:n] = to_kernel(frames[:n], self.raw[:n])
         self._message["control"][:n] = 0
         self._message["control_size"][:n] = 0
-        taken = _libc.sendmmsg(fileno, ctypes.c_void_p(self._headers.ctypes.data), n, 0)
+        taken = _libc.sendmmsg(fileno, self._address, n, 0)
         if taken < 0:
             raise _error()
         return int(taken)
@@ -162,17 +175,15 @@ class Batch:
 
 def from_kernel(received: Received) -> np.ndarray:
     """Frames in FRAME_DTYPE, error frames included; what is neither of CAN's two sizes must have been taken out."""
-    raw, is_fd = received.raw, received.size == FD_SIZE
+    raw, is_fd = received.raw, (received.size == FD_SIZE).view(np.uint8)
     kind = raw["id"] >> 29
-    out = np.empty(raw.shape, fr.FRAME_DTYPE)
+    out = np.empty(raw.size, fr.FRAME_DTYPE)
     out["t_ns"] = received.t_ns
-    out["id"] = raw["id"] & _ID_MASK[kind]
-    out["flags"] = _KIND_FLAGS[kind] | is_fd * _FD_FLAGS[raw["flags"] & 3]
-    out["length"] = np.minimum(raw["length"], np.where(is_fd, fr.MAX_DATA, 8))
-    out["data"] = raw["data"]
-    short = np.flatnonzero(out["length"] < fr.MAX_DATA)
-    if short.size:  # the rest is what the sender or the frame before has left there
-        out["data"][short] *= np.arange(fr.MAX_DATA) < out["length"][short, None]
+    out["id"] = raw["id"] & _ID_MASK.take(kind)
+    out["flags"] = _KIND_FLAGS.take(kind) | _FD_FLAGS.take(raw["flags"] & 3) * is_fd
+    length = out["length"] = np.minimum(raw["length"], _MOST_DATA.take(is_fd))
+    # Beyond the length is what the sender, or the frame before in the same buffer, has left there.
+    np.bitwise_and(raw["data"], _WITHIN.take(length, axis=0), out=out["data"])
     return out
 
 

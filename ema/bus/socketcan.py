@@ -21,6 +21,7 @@ from .port import RECEIVE_BUFFER, Filters, Port, ask_for_buffer
 
 _CAN_RAW_ERR_FILTER = 2  # linux/can/raw.h; Python's socket module does not name it
 _SIOCGIFMTU = 0x8921  # linux/sockios.h
+_ERROR = np.uint8(FrameFlag.ERROR)
 _ALL_ERRORS = 0x1FFFFFFF
 _FULL_QUEUE_PATIENCE = 0.05  # [s]
 _FULL_QUEUE_PAUSE = 0.001  # [s]
@@ -160,7 +161,8 @@ class SocketCanPort(Port):
             self.counters.n_unreadable += int(np.count_nonzero(~whole))
             received = received.where(whole)
         frames = mmsg.from_kernel(received)
-        frames["t_ns"][frames["t_ns"] == 0] = time.time_ns()
+        if not frames["t_ns"].all():
+            frames["t_ns"][frames["t_ns"] == 0] = time.time_ns()
         frames = self._without_errors(frames)
         if len(frames):
             self.counters.n_received += len(frames)
@@ -168,9 +170,9 @@ class SocketCanPort(Port):
         return frames
 
     def _without_errors(self, frames: np.ndarray) -> np.ndarray:
-        is_error = (frames["flags"] & FrameFlag.ERROR) != 0
-        if not is_error.any():
+        if not np.bitwise_or.reduce(frames["flags"]) & _ERROR:
             return frames
+        is_error = (frames["flags"] & _ERROR) != 0
         self.counters.n_error_frames += int(np.count_nonzero(is_error))
         for frame in frames[is_error]:
             self._controller = _controller(int(frame["id"]), int(frame["data"][1]), self._controller)

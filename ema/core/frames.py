@@ -46,6 +46,16 @@ def joined(parts: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate([part.view(_BYTES) for part in parts]).view(FRAME_DTYPE)
 
 
+def chosen(frames: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """``frames[which]``, by a mask or by indices, shape (n,); as plain bytes, which numpy copies ten times as fast."""
+    return frames.view(_BYTES)[which].view(FRAME_DTYPE)
+
+
+def place(frames: np.ndarray, into: np.ndarray, where: np.ndarray) -> None:
+    """``into[where] = frames``, as plain bytes."""
+    into.view(_BYTES)[where] = frames.view(_BYTES)
+
+
 def pack(frames: np.ndarray) -> bytes:
     """Bytes of a batch of frames, FRAME_DTYPE.itemsize each."""
     return np.ascontiguousarray(frames, FRAME_DTYPE).tobytes()

@@ -24,6 +24,8 @@ from .outputs import Event, Level
 from .settings import MonitorSettings
 
 _ERROR, _TX = int(FrameFlag.ERROR), int(FrameFlag.TX)
+_ODD = np.uint8(_ERROR | _TX)
+_GOOD, _REFUSED = int(GOOD), int(Check.REFUSED)  # as plain numbers: looked at for every few frames
 RECEIVED = ("CycleStart", "CycleEnd", "PhaseCurrents", "Motion", "Supply")
 _MANY = 512  # frames that wait at most
 
@@ -37,6 +39,7 @@ class _Batch(NamedTuple):
     message: np.ndarray  # identifier of the DBC message
     actuator: np.ndarray
     contested: np.ndarray  # whether it shows that two send in its actuator's name
+    mark: np.ndarray  # whether it is a CycleStart or CycleEnd, good or not, or says that frames were dropped
 
     def part(self, begin: int, end: int) -> _Batch:
         return _Batch(*(column[begin:end] for column in self))
@@ -46,7 +49,9 @@ def _joined(batches: list[_Batch]) -> _Batch:
     if len(batches) == 1:
         return batches[0]
     if not batches:
-        return _Batch(fr.empty(0), *(np.zeros(0, kind) for kind in (np.uint8, np.int64, np.uint32, np.uint32, bool)))
+        return _Batch(
+            fr.empty(0), *(np.zeros(0, kind) for kind in (np.uint8, np.int64, np.uint32, np.uint32, bool, bool))
+        )
     frames, *columns = zip(*batches, strict=True)
     return _Batch(fr.joined(frames), *map(np.concatenate, columns))
 
@@ -82,8 +87,7 @@ class Assembler:
         batch = self._gathered(self._checked(frames))
         if batch is None:
             return
-        bounds = (batch.checks <= GOOD) & ((batch.message == self._start) | (batch.message == self._end))
-        marks = bounds | is_overflow(batch.frames)
+        marks = batch.mark & ((batch.checks <= _GOOD) | is_overflow(batch.frames))
         begin = 0
         for mark in [*np.flatnonzero(marks).tolist(), None]:
             end = len(batch.frames) if mark is None else mark + 1
@@ -127,9 +131,7 @@ class Assembler:
         latest_ns = int(batch.t_ns.max())
         if not (
             self._n_waiting >= _MANY
-            or (batch.message == self._start).any()
-            or (batch.message == self._end).any()
-            or is_overflow(batch.frames).any()
+            or batch.mark.any()
             or any(assembly.may_be_due(latest_ns) for assembly in self._assemblies.values())
         ):
             return None
@@ -137,21 +139,26 @@ class Assembler:
         return gathered
 
     def _checked(self, frames: np.ndarray) -> _Batch:
-        odd = (frames["flags"] & (_TX | _ERROR)) != 0
-        data: slice | np.ndarray = slice(None)
-        if not odd.any():
-            checks = self.receiver.check(frames)
+        if not np.bitwise_or.reduce(frames["flags"]) & _ODD:
+            checks, shown, notices = self.receiver.check(frames), self.receiver.contested, None
         else:
-            frames = frames[((frames["flags"] & _TX) == 0) & (~odd | is_overflow(frames))]
-            data = (frames["flags"] & _ERROR) == 0
+            sent, error = ((frames["flags"] & flag) != 0 for flag in (_TX, _ERROR))
+            frames = fr.chosen(frames, ~sent & (~error | is_overflow(frames)))
+            notices = is_overflow(frames)
+            data = np.flatnonzero(~notices)
             checks = np.full(frames.size, Check.FOREIGN, np.uint8)
-            checks[data] = self.receiver.check(frames[data])
+            checks[data] = self.receiver.check(fr.chosen(frames, data))
+            shown = data[self.receiver.contested].tolist()
         contested = np.zeros(frames.size, bool)
-        if self.receiver.contested:
-            contested[np.arange(frames.size)[data][self.receiver.contested]] = True
+        if shown:
+            contested[shown] = True
         ids = frames["id"]
-        t_ns = frames["t_ns"].astype(np.int64)
-        return _Batch(frames, checks, t_ns, identifiers.message_id(ids), identifiers.actuator(ids), contested)
+        message = identifiers.message_id(ids)
+        mark = (message == self._start) | (message == self._end)
+        if notices is not None:
+            mark |= notices
+        t_ns = frames["t_ns"].view(np.int64)
+        return _Batch(frames, checks, t_ns, message, identifiers.actuator(ids), contested, mark)
 
     def _place(self, batch: _Batch) -> Iterator[AssembledCycle | Event]:
         """Place frames; a cycle whose time runs out, or whose last frame comes, is closed at that frame."""
@@ -172,7 +179,7 @@ class Assembler:
         open_ones = [assembly for assembly in self._assemblies.values() if assembly.may_be_due(latest_ns)]
         if not open_ones:
             return first
-        currents = (batch.message == self._currents) & (batch.checks <= GOOD)
+        currents = (batch.message == self._currents) & (batch.checks <= _GOOD)
         numbers = sequence(batch.frames)
         for assembly in open_ones:
             due = assembly.due(batch.t_ns, currents & (batch.actuator == assembly.actuator), numbers)
@@ -185,13 +192,18 @@ class Assembler:
             return
         currents = batch.message == self._currents
         motions = batch.message == self._motion
-        refused = batch.checks == Check.REFUSED
+        refused, contested = batch.checks == _REFUSED, batch.contested
+        any_refused, any_contested = refused.any(), contested.any()
         for number in self._assemblies.keys() & set(batch.actuator.tolist()):
             own, assembly = batch.actuator == number, self._assemblies[number]
-            mine, moves = own & currents, own & motions
-            assembly.place(batch.frames[mine], batch.checks[mine], batch.frames[moves], batch.checks[moves])
-            assembly.note_contested(batch.t_ns[own & batch.contested])
-            assembly.note_refused(int(np.count_nonzero(own & refused)))
+            mine, moves = np.flatnonzero(own & currents), np.flatnonzero(own & motions)
+            assembly.place(
+                fr.chosen(batch.frames, mine), batch.checks[mine], fr.chosen(batch.frames, moves), batch.checks[moves]
+            )
+            if any_contested:
+                assembly.note_contested(batch.t_ns[own & contested])
+            if any_refused:
+                assembly.note_refused(int(np.count_nonzero(own & refused)))
 
     def _mark(self, mark: _Batch) -> Iterator[AssembledCycle | Event]:
         """A good CycleStart or CycleEnd, or the notice that frames were dropped."""

@@ -15,6 +15,7 @@ from ema.bus.header import N_SEQUENCES
 from ema.bus.span import SAMPLES_PER_FRAME, Span
 from ema.bus.speakers import Crossings
 from ema.bus.stream import GOOD, Check
+from ema.core import frames as fr
 from ema.core.names import CURRENTS
 from ema.core.status import Reason
 
@@ -22,8 +23,9 @@ from .cycles import AssembledCycle, Tally
 from .track import Track
 
 CONTESTED_NS = 2_000_000_000  # a cycle that ends so soon after two senders were seen may be of either
-NEVER = np.iinfo(np.int64).max
+NEVER = int(np.iinfo(np.int64).max)
 _NOTHING = Reason(0)
+_GOOD, _REPEATED = int(GOOD), int(Check.REPEATED)  # as plain numbers: looked at for every few frames
 _OF_TALLY = (
     Reason.LOST_FRAMES, Reason.REORDERED_FRAMES, Reason.REPEATED_FRAMES, Reason.CORRUPT_FRAMES, Reason.AUTHENTICATION,
 )  # fmt: skip
@@ -83,10 +85,10 @@ class Assembly:
 
     def place(self, currents: np.ndarray, checks: np.ndarray, motions: np.ndarray, motion_checks: np.ndarray) -> None:
         """Take frames of PhaseCurrents and of Motion with their checks."""
-        self._checks += np.bincount(checks, minlength=len(Check))
-        good = currents[checks <= GOOD]
+        self._checks += np.bincount(checks, minlength=self._checks.size)
+        good = fr.chosen(currents, checks <= _GOOD)
         self._currents.put(good)
-        self._motions.put(motions[motion_checks <= GOOD])
+        self._motions.put(fr.chosen(motions, motion_checks <= _GOOD))
         self._compare(self._currents, self._crossings[0], currents, checks)
         self._compare(self._motions, self._crossings[1], motions, motion_checks)
         if good.size:
@@ -94,7 +96,7 @@ class Assembly:
 
     def _compare(self, track: Track, crossings: Crossings, frames: np.ndarray, checks: np.ndarray) -> None:
         """Look for a sequence that goes on after frames with the same numbers and other contents."""
-        strange = checks == Check.REPEATED
+        strange = checks == _REPEATED
         if strange.any():
             strange[strange] = track.contradicts(frames[strange])
         elif not crossings.strange:
@@ -102,7 +104,7 @@ class Assembly:
         for t_ns, is_strange, check in zip(frames["t_ns"].tolist(), strange.tolist(), checks.tolist(), strict=True):
             if is_strange:
                 crossings.strange = True
-            elif check <= GOOD and crossings.go_on(t_ns):
+            elif check <= _GOOD and crossings.go_on(t_ns):
                 self._contested_ns = max(self._contested_ns, t_ns)
 
     def note_contested(self, t_ns: np.ndarray) -> None:

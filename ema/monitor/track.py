@@ -38,7 +38,7 @@ class Track:
         steps[1:] -= numbers[:-1]
         positions = self._last + np.cumsum((steps + MAX_AHEAD) % N_SEQUENCES - MAX_AHEAD)
         slots = positions % self._frames.size
-        self._frames[slots] = frames
+        fr.place(frames, self._frames, slots)
         self._positions[slots] = positions
         self._last = int(positions[-1])
 
@@ -61,8 +61,8 @@ class Track:
         positions = self._position(first) + np.arange(count)
         slots = positions % self._frames.size
         present = self._positions[slots] == positions
-        frames = self._frames[slots]
-        frames[~present] = fr.empty(1)
+        frames = fr.chosen(self._frames, slots)
+        frames.view(np.uint8).reshape(count, -1)[~present] = 0
         self._positions[slots[present]] = ~positions[present]
         return frames, present
 
