@@ -72,6 +72,47 @@ def check(files: tuple[Path, ...], plant: Path | None, picture: Path | None, as_
         raise NegativeAnswer(f"{', '.join(useless)}: enough for no plant")
 
 
+@records.command("map", short_help="Propose what the columns of a stranger's file are.")
+@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
+@click.option("--write", is_flag=True, help="write it beside FILE, as NAME.record.yaml; must not exist")
+def map_columns(file: Path, write: bool) -> None:
+    """Propose a sidecar for FILE by its titles and units: what each column is, and what to look at. Read it, mend it:
+    nothing is read by a guess unless the sidecar says so. Exit status 1 if no column looks like a time.
+
+    \b
+    Examples:
+      ema records map bench.csv
+      ema records map bench.csv --write
+    """
+    from ema.core import sidecar
+    from ema.core.errors import ConfigError, NegativeAnswer
+    from ema.core.files import require_file
+    from ema.discrepancy.records.naming import propose
+
+    from .proposed_sidecar import as_sidecar, table_of
+
+    beside = sidecar.beside(file)
+    if write and beside.exists():
+        raise ConfigError(f"{beside}: exists, and is not overwritten; see it, or move it away")
+    proposals = propose(table_of(require_file(file)))
+    text = as_sidecar(file.name, proposals)
+    if not any(one.channel == "t" for one in proposals):
+        click.echo(text, nl=False)
+        raise NegativeAnswer(
+            f"{file}: no column looks like a time; map one by hand (a counter: {{channel: t, unit: s, scale: PERIOD}})"
+        )
+    if not write:
+        click.echo(text, nl=False)
+        return
+    try:
+        with beside.open("x", encoding="utf-8") as out:
+            out.write(text)
+    except OSError as error:
+        raise ConfigError(f"{beside}: cannot be written ({error.strerror})") from error
+    click.echo(f"made {beside}: read it, and mend what is not so")
+    click.echo(f"next: ema records check {file}")
+
+
 def _as_dict(record: Record, clock: Any, facts: Any, agree: Any, able: Any) -> dict[str, Any]:
     return {
         "file": record.name,

@@ -18,11 +18,16 @@ from .table_records import record_of
 
 
 def read_parquet(path: str | Path, plan: sidecar.Sidecar | None = None) -> Record:
-    """Read a Parquet file; a column of time stamps counts from its first one. [s]"""
+    """Read a Parquet file with its sidecar, or by `plan` where it has none."""
+    path = Path(path)
+    return record_of(parquet_table(path), sidecar.of(path, plan))
+
+
+def parquet_table(path: Path) -> Table:
+    """The table in a Parquet file; a column of time stamps counts from its first one. [s]"""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    path = Path(path)
     try:
         read = pq.read_table(path)
     except (OSError, pa.ArrowException) as error:
@@ -36,15 +41,20 @@ def read_parquet(path: str | Path, plan: sidecar.Sidecar | None = None) -> Recor
             columns[name], units[index] = (whole - whole[0]) / 1e9, "s"
         else:
             columns[name] = values.to_numpy()
-    return record_of(_table(path, columns, units), sidecar.of(path, plan))
+    return _table(path, columns, units)
 
 
 def read_mat(path: str | Path, plan: sidecar.Sidecar | None = None) -> Record:
-    """Read a MATLAB file (v4 to v7.2 by scipy, v7.3 by h5py): its vectors of the commonest length.
+    """Read a MATLAB file with its sidecar, or by `plan` where it has none."""
+    path = Path(path)
+    return record_of(mat_table(path), sidecar.of(path, plan))
+
+
+def mat_table(path: Path) -> Table:
+    """The table in a MATLAB file (v4 to v7.2 by scipy, v7.3 by h5py): its vectors of the commonest length.
 
     Fields of structures are named ``structure.field``; the columns of a matrix ``name_1``, ``name_2`` …
     """
-    path = Path(path)
     try:
         with require_file(path).open("rb") as file:
             is_hdf = b"MATLAB 7.3" in file.read(128)
@@ -56,7 +66,7 @@ def read_mat(path: str | Path, plan: sidecar.Sidecar | None = None) -> Record:
     if not vectors:
         raise RecordError(f"{path}: holds no vector of numbers")
     ((n, _),) = Counter(len(x) for x in vectors.values() if len(x) > 1).most_common(1) or [(1, 0)]
-    return record_of(_table(path, {name: x for name, x in vectors.items() if len(x) == n}, {}), sidecar.of(path, plan))
+    return _table(path, {name: x for name, x in vectors.items() if len(x) == n}, {})
 
 
 def _matlab(path: Path) -> dict[str, Any]:

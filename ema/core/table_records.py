@@ -35,7 +35,10 @@ def record_of(table: Table, side: sidecar.Sidecar) -> Record:
         if step is not None:
             resolution[name] = step
     if "t" not in channels:
-        raise RecordError(f"{path}: missing column 't [s]' (columns: {', '.join(header)})")
+        raise RecordError(
+            f"{path}: missing column 't [s]' (columns: {', '.join(header)}); where it has another title, "
+            f"'ema records map {path}' proposes what the columns are"
+        )
     ignored = tuple(name for index, name in enumerate(header) if index not in columns)
     number = channels.pop("cycle", None)
     marks = values[header.index(rule)] if rule else None

@@ -17,6 +17,15 @@ LARGEST = 1e12  # no quantity of an actuator, a flight or a log, in the unit it 
 _TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*((?:1?\s*/\s*)?[^\W\d_].*|[°%].*)", re.DOTALL)
 _UNIT = re.compile(r"[\w°%/*^ .()-]{0,60}")
 _NO_POWER = re.compile(r"(?:\*\*|\^)\s*-?(?:\d\d|\s*\d?\s*(?:\*\*|\^))")  # pint would calculate 9**9**9**9
+# As engineers write them: pint reads "Nm" as a number of metres, and knows "rpm" in small letters only.
+_AS_WRITTEN = (
+    "newton_meter = newton * meter = Nm",
+    "newton_millimeter = newton * millimeter = Nmm",
+    "@alias turn = rev",
+    "@alias revolutions_per_minute = RPM",
+    "@alias ampere = Amp = amp = Amps = amps",
+    "@alias volt = Volts = volts",
+)
 # What pint's parser lets through, beside its own errors.
 _PARSER = (ValueError, TypeError, AssertionError, AttributeError, ArithmeticError, SyntaxError, tokenize.TokenError)
 
@@ -26,7 +35,8 @@ def _registry() -> Any:
     import pint
 
     registry: Any = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
-    registry.define("@alias turn = rev")
+    for definition in _AS_WRITTEN:
+        registry.define(definition)
     return registry
 
 
@@ -61,7 +71,7 @@ def to_unit(value: str, unit: str) -> float:
 
 def _parted(text: str) -> tuple[str, str]:
     """Number and unit."""
-    match = _TEXT.fullmatch(text)
+    match = _TEXT.fullmatch(text.replace("·", "*"))
     if match is None:
         raise ValueError(text)
     number, unit = match.groups()
@@ -82,6 +92,7 @@ def convert(from_unit: str, unit: str) -> tuple[float, float]:
         return 1.0, 0.0
     import pint
 
+    from_unit = from_unit.replace("·", "*")
     try:
         registry = _registry()
         _check(from_unit)
@@ -102,8 +113,9 @@ def is_unit(text: str) -> bool:
     import pint
 
     try:
-        _check(text)
-        _registry().Unit(text)
+        plain_dots = text.replace("·", "*")
+        _check(plain_dots)
+        _registry().Unit(plain_dots)
         return bool(text)
     except (pint.PintError, *_PARSER):
         return False

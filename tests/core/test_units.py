@@ -1,6 +1,6 @@
 import pytest
 
-from ema.core.units import convert, plain, to_unit
+from ema.core.units import convert, is_unit, plain, to_unit
 
 
 @pytest.mark.parametrize(
@@ -53,3 +53,14 @@ def test_where_no_unit_is_known_a_text_with_one_is_refused():
     assert plain(3) == 3
     with pytest.raises(ValueError, match="a number without a unit is wanted here"):
         plain("6e-5 N m s/rad")
+
+
+@pytest.mark.parametrize(
+    ("written", "unit", "scale"),
+    [("Nm", "N m", 1.0), ("mNm", "N m", 1e-3), ("N·m", "N m", 1.0), ("Nmm", "N m", 1e-3), ("Nm/A", "N m/A", 1.0),
+     ("Amps", "A", 1.0), ("RPM", "rad/s", 0.10471975511965977)],
+)  # fmt: skip
+def test_units_as_engineers_write_them(written, unit, scale):
+    assert is_unit(written)
+    assert convert(written, unit) == pytest.approx((scale, 0.0))
+    assert to_unit(f"2 {written}", unit) == pytest.approx(2.0 * scale)

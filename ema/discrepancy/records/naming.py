@@ -1,0 +1,132 @@
+"""What a stranger's titles probably mean: a proposal to be read by its owner, never a reading of the file by itself."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from ema.core.names import CHANNELS
+from ema.core.table import Table
+from ema.core.table_records import titled
+from ema.core.units import convert
+
+_COMMAND = {
+    "ref", "reference", "cmd", "command", "commanded", "target", "goal", "desired", "des", "set", "setpoint", "demand",
+    "soll",
+}  # fmt: skip
+_SUPPLY = {"dc", "bus", "supply", "vbus", "udc", "vdc", "battery", "batt", "vsupply"}
+_OUTPUT = {"user", "output", "load", "lvdt", "surface", "ram"}
+_PHASE = {"a": "i_a", "b": "i_b", "c": "i_c", "u": "i_a", "v": "i_b", "w": "i_c"}
+_PHASES = re.compile(r"(?:i|cur|current|phase|iphase|i ?phase)[ _]*([abcuvw])$")
+# What is measured, by its unit where the file gives one, else by the words of the title.
+_UNITS = {
+    "time": "s", "angle": "rad", "length": "m", "turning": "rad/s", "speed": "m/s", "current": "A", "voltage": "V",
+    "force": "N", "torque": "N m", "temperature": "°C",
+}  # fmt: skip
+_WORDS = {
+    "time": "t time timestamp zeit sec secs seconds stamp",
+    "length": "displacement stroke travel",
+    "angle": "pos position angle theta phi q encoder enc th joint shaft winkel weg",
+    "turning": "vel velocity speed omega w dq qd rpm rate geschwindigkeit drehzahl",
+    "current": "current cur i iq amps amp strom",
+    "voltage": "voltage volt volts u uq spannung",
+    "force": "force kraft f",
+    "torque": "torque tau moment effort trq drehmoment",
+    "duty": "duty pwm dutycycle",
+    "temperature": "temperature temp temperatur",
+    "enabled": "enabled enable active",
+}
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What one column may be: `channel` None where nothing fits, `said` tells why, or what to look at."""
+
+    title: str
+    channel: str | None
+    unit: str | None
+    said: str
+
+
+def propose(table: Table) -> list[Proposal]:
+    """One proposal for each column of the file; each channel is proposed once, the first column that fits."""
+    seen = [_quantity(title, table.units.get(index)) for index, title in enumerate(table.header)]
+    is_linear = any(what in ("length", "force", "speed") for what, _ in seen)
+    is_actuator = sum(_PHASES.search(_plain(title)) is not None for title in table.header) >= 2
+    taken: dict[str, str] = {}
+    found = []
+    for title, (what, unit) in zip(table.header, seen, strict=True):
+        channel = _channel(title, what, is_linear, is_actuator)
+        if channel is None:
+            found.append(Proposal(title, None, None, "no channel of an axis or an actuator by its title and unit"))
+        elif channel in taken:
+            found.append(Proposal(title, None, None, f"looks like {channel} too, as '{taken[channel]}' does"))
+        else:
+            taken[channel] = title
+            said = CHANNELS[channel].meaning
+            if unit is None and CHANNELS[channel].unit != "1":
+                said += f"; the file gives no unit: is it {CHANNELS[channel].unit}?"
+            found.append(Proposal(title, channel, unit or CHANNELS[channel].unit, said))
+    return found
+
+
+def _plain(title: str) -> str:
+    """The title without its unit, in small letters, words apart: ``MotorPos_ref [deg]`` is ``motor pos ref``."""
+    name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", titled(title)[0])
+    return re.sub(r"[^a-z0-9]+", " ", name.lower()).strip()
+
+
+def _quantity(title: str, apart: str | None) -> tuple[str | None, str | None]:
+    """What is measured and its unit, None where not known; a unit of the file counts more than a word."""
+    unit = titled(title)[1] or apart
+    if unit is not None:
+        for what, target in _UNITS.items():
+            if _converts(unit, target):
+                return what, unit
+    words = _plain(title).split()
+    for what, known in _WORDS.items():
+        if set(words) & set(known.split()):
+            if (ending := _ending(title)) is None:
+                return what, None
+            # a position may be of an angle or of a length, and so its speed: its unit says
+            return next(((w, ending) for w, target in _UNITS.items() if _converts(ending, target)), (what, None))
+    return ("current", None) if _PHASES.search(_plain(title)) else (None, None)
+
+
+def _ending(title: str) -> str | None:
+    """The unit in the last part of a title such as ``pos_deg`` or ``torque Nm``, None where it is none."""
+    parts = re.split(r"[_ ]+", titled(title)[0].strip())
+    known = len(parts) > 1 and len(parts[-1]) > 1 and any(_converts(parts[-1], unit) for unit in _UNITS.values())
+    return parts[-1] if known else None
+
+
+def _converts(unit: str, target: str) -> bool:
+    try:
+        convert(unit, target)
+    except ValueError:
+        return False
+    return True
+
+
+def _channel(title: str, what: str | None, is_linear: bool, is_actuator: bool) -> str | None:
+    words = set(_plain(title).split())
+    is_command = bool(words & _COMMAND)
+    if what in ("angle", "length"):
+        if is_actuator:
+            return "theta_cmd" if is_command else "theta_u" if words & _OUTPUT else "theta_m"
+        if is_command:
+            return "q_ref" if is_linear else "theta_ref"
+        return "q" if is_linear else "theta_m"
+    if what in ("turning", "speed"):
+        if is_command:
+            return None if is_linear else "w_ref"
+        return "v" if is_linear else "w_m"
+    if what == "voltage":
+        return "u_dc" if words & _SUPPLY else "u_q"
+    if what == "current" and (phase := _PHASES.search(_plain(title))) and is_actuator:
+        return _PHASE[phase[1]]
+    simple = {
+        "time": "t", "current": "i_q", "force": "force", "torque": "torque", "duty": "duty", "temperature": "temp_w",
+        "enabled": "enabled",
+    }  # fmt: skip
+    return None if is_command else simple.get(what or "")

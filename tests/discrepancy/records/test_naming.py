@@ -1,0 +1,95 @@
+"""Titles as strangers write them, and what they are taken for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from ema.cli import cli
+from ema.core.errors import ConfigError, NegativeAnswer, RecordError
+from ema.core.records import read_record
+
+
+def mapped(tmp_path, titles, units="", *options):
+    """The answer of `ema records map` and the file, two rows of numbers."""
+    n = len(titles.split(","))
+    rows = [",".join(str(float(row + column)) for column in range(n)) for row in range(3)]
+    path = tmp_path / "bench.csv"
+    path.write_text("\n".join([titles, *([units] if units else []), *rows]) + "\n")
+    return path, CliRunner().invoke(cli, ["records", "map", str(path), *options], catch_exceptions=False)
+
+
+def channels(answer):
+    columns = yaml.safe_load(answer.stdout)["columns"]
+    return {title: one if one == "ignore" else (one["channel"], one["unit"]) for title, one in columns.items()}
+
+
+@pytest.mark.parametrize(
+    ("titles", "units", "wanted"),
+    [
+        (
+            "Time [ms],Position [mm],Force [N]", "",
+            {"Time [ms]": ("t", "ms"), "Position [mm]": ("q", "mm"), "Force [N]": ("force", "N")},
+        ),
+        (
+            "time,goal,angle,torque", "s,rad,rad,N m",
+            {
+                "time": ("t", "s"), "goal": ("theta_ref", "rad"), "angle": ("theta_m", "rad"),
+                "torque": ("torque", "N m"),
+            },
+        ),
+        (
+            "timestamp,goal_position,motorPos,motorVelocity_rpm,Iq,V_bus", "",
+            {
+                "timestamp": ("t", "s"), "goal_position": ("theta_ref", "rad"), "motorPos": ("theta_m", "rad"),
+                "motorVelocity_rpm": ("w_m", "rpm"), "Iq": ("i_q", "A"), "V_bus": "ignore",
+            },
+        ),
+        (
+            "t_s,Phase A,Phase B,Phase C,rotor angle (deg),lvdt (deg),cmd (deg),Temp (°C)", "",
+            {
+                "t_s": ("t", "s"), "Phase A": ("i_a", "A"), "Phase B": ("i_b", "A"), "Phase C": ("i_c", "A"),
+                "rotor angle (deg)": ("theta_m", "deg"), "lvdt (deg)": ("theta_u", "deg"),
+                "cmd (deg)": ("theta_cmd", "deg"), "Temp (°C)": ("temp_w", "°C"),
+            },
+        ),
+    ],
+)  # fmt: skip
+def test_titles_and_units_of_strangers(tmp_path, titles, units, wanted):
+    _, answer = mapped(tmp_path, titles, units)
+    assert answer.exit_code == 0
+    assert channels(answer) == wanted
+
+
+def test_a_unit_that_the_file_does_not_give_is_asked_for(tmp_path):
+    _, answer = mapped(tmp_path, "time,position,current")
+    assert "the file gives no unit: is it rad?" in answer.stdout
+
+
+def test_a_second_column_of_a_kind_is_left_out_and_said(tmp_path):
+    _, answer = mapped(tmp_path, "t [s],position 1 [rad],position 2 [rad],i_q [A]")
+    assert channels(answer)["position 2 [rad]"] == "ignore"
+    assert "looks like theta_m too, as 'position 1 [rad]' does" in answer.stdout
+
+
+def test_what_is_written_is_read_and_not_written_over(tmp_path):
+    path, answer = mapped(tmp_path, "Time [ms],Position [mm],Force [N]", "", "--write")
+    assert answer.exit_code == 0
+    (cycle,) = read_record(path)
+    assert np.diff(cycle["t"]) == pytest.approx(1e-3)
+    assert cycle["q"] == pytest.approx([0.001, 0.002, 0.003])
+    with pytest.raises(ConfigError, match="exists, and is not overwritten"):
+        mapped(tmp_path, "Time [ms],Position [mm],Force [N]", "", "--write")
+
+
+def test_without_a_time_the_answer_is_no(tmp_path):
+    with pytest.raises(NegativeAnswer, match="no column looks like a time"):
+        mapped(tmp_path, "position [rad],current [A]")
+
+
+def test_a_file_without_a_known_time_names_the_command(tmp_path):
+    path, _ = mapped(tmp_path, "Time [ms],Position [mm],Force [N]")
+    with pytest.raises(RecordError, match=f"'ema records map {path}' proposes"):
+        CliRunner().invoke(cli, ["records", "check", str(path)], catch_exceptions=False)
