@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from ema.core import config
+from ema.models.axis_config import LINES
 
 from .findings import FoundEffect
 
@@ -18,8 +19,8 @@ def write_extended(
 ) -> None:
     """Write `plant_file` with the effects' values and intervals of 95 %; what an engineer would say stands at the top.
 
-    An axis may have an effect more than once (cogging lines): the next gets a number, ``cogging#2``. On an actuator the
-    values found replace those of the file. `fitted` replaces further keys.
+    An axis may have lines of torque more than once: the next gets a number, ``cogging#2``. On an actuator the values
+    found replace those of the file. `fitted` replaces further keys.
     """
     data: dict[str, Any] = config.read_yaml(plant_file)
     declared: dict[str, dict[str, float]] = dict(data.get("effects") or {})
@@ -29,7 +30,7 @@ def write_extended(
     several = data.get("kind") == "axis"
     for effect in effects:
         key, number = effect.name, 1
-        while several and (key in written or (effect.name == "cogging" and key in declared)):
+        while several and (key in written or (effect.name in LINES and key in declared)):
             number += 1
             key = f"{effect.name}#{number}"
         written.add(key)

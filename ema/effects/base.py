@@ -8,6 +8,8 @@ Each law belongs to a *hook*, the place in the models' equations where it enters
 hook                  arguments before the parameters                            combined by             neutral
 ====================  =========================================================  ======================  ========
 shaft_torque          θ_m [rad], ω_m [rad/s], θ_u [rad], i_q [A]                 sum, opposes motion     0 N m
+drifting_torque       ω_m, t [s] of the cycle, ΔT [K]                            sum, opposes motion     0 N m
+drifting_friction     t, ΔT                                                      product on F_s and F_d  1
 tabulated_torque      the same (see below)                                       sum, opposes motion     0 N m
 static_friction       θ_m, ω_m, θ_u, direction (±1), τ_load [N m]                product on F_s          1
 sliding_friction      θ_m, ω_m, θ_u, direction (±1), τ_load [N m]                product on F_d          1
@@ -20,8 +22,8 @@ position_error        θ_m [rad]                                                
 ====================  =========================================================  ======================  ========
 
 ΔT is the winding temperature less `T_REFERENCE`. The speed of a resolver has the slope of its angle's error; an error
-on the angle only leaves a speed from another sensor as it is. A tabulated torque is a shaft torque that costs a fifth
-of a step.
+on the angle only leaves a speed from another sensor as it is. What drifts, the axis model has. A tabulated torque is a
+shaft torque that costs a fifth of a step.
 A kernel is compiled with those parts of the library only that its runs need (`ema.models.parts`). An effect without
 laws is *structural*: the model itself reads its parameters (a delay, a dead time, a second inertia).
 """
@@ -37,6 +39,8 @@ HOOKS = MappingProxyType(
     {
         "shaft_torque": ("sum", 4),
         "tabulated_torque": ("sum", 4),
+        "drifting_torque": ("sum", 3),
+        "drifting_friction": ("product", 2),
         "static_friction": ("product", 5),
         "sliding_friction": ("product", 5),
         "user_torque": ("sum", 1),

@@ -12,7 +12,7 @@ from ema.effects import registry
 from ema.effects.torque_term import COLUMNS, NEUTRAL
 
 from . import axis_kernel as kernel
-from .axis_config import INSTANCE, Axis
+from .axis_config import INSTANCE, LINES, Axis
 from .axis_layout import N_ROWS, row
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ Effects = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Model:
-    """Numbers of one axis, ready for the kernel: parameter array, cogging lines, unnamed terms."""
+    """Numbers of one axis, ready for the kernel: parameter array, lines of torque, unnamed terms."""
 
     z: Array
     lines: Array
@@ -67,7 +67,7 @@ def model(
     lines = []
     for key, given in merged.items():
         name = key.split(INSTANCE)[0]
-        if name == "cogging":
+        if name in LINES:
             full = {**registry()[name].neutral(), **given}
             lines.append([full["amplitude"], full["order"], full["phase"]])
             continue
@@ -89,6 +89,7 @@ def simulate(
     dT: Array | None = None,
     slide: Array | None = None,
     between: str = "straight",
+    bristles: Array | None = None,
 ) -> Array:
     """Outputs (4, n_times) of all windows: position, speed, current, voltage as the sensors show them.
 
@@ -108,7 +109,11 @@ def simulate(
     between : str
         What the drive does from one sample to the next: runs straight, is held, or is that of the next (held before).
         A speed loop acts once a sample, or (fast) between samples too.
+    bristles : array, shape (n_windows,), optional
+        Share of dry friction, -1…1, that is built up where a window begins; all of it where not given.
     """
+    bristles = np.sign(starts[:, 1]) if bristles is None else bristles
+    starts = np.column_stack([starts, bristles])
     slide = np.zeros(len(starts)) if slide is None else slide
     dT = np.zeros(len(starts)) if dT is None else dT
     out = np.empty((len(kernel.OUTPUTS), len(t)))
@@ -143,6 +148,23 @@ def loads_after(
     """
     out = np.empty((len(follows), 2))
     kernel.loads_after(numbers.z, offsets, t, theta, follows, h_max, out)
+    return out
+
+
+def has_memory(numbers: Model) -> bool:
+    """Whether friction has a memory, so that a window also begins with a share of it that is built up."""
+    return bool(numbers.z[row("friction_memory.deflection")] > 0.0)
+
+
+def bristles_after(
+    numbers: Model, offsets: NDArray[np.int64], t: Array, theta: Array, follows: NDArray[np.bool_], play: float
+) -> Array:
+    """Share of friction that is built up at the end of each recorded motion, shape (n,); see `loads_after`.
+
+    `play`: half width of what is noise of the angle and no way. [rad]
+    """
+    out = np.empty(len(follows))
+    kernel.bristles_after(numbers.z, offsets, t, theta, follows, play, out)
     return out
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
@@ -14,7 +15,10 @@ from ema.core.units import plain, quantity, to_unit
 from ema.effects import checked
 from ema.effects.torque_term import COLUMNS
 
+from .gear_orders import gear_orders
+
 INSTANCE = "#"  # cogging#2 is a second cogging line
+LINES = ("cogging", "gear_error")  # effects of which there may be several
 
 
 def _noise(value: Any, info: ValidationInfo) -> Any:
@@ -104,8 +108,8 @@ class Axis(Settings):
     def _known_effects(cls, effects: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
         for key, values in effects.items():
             name = key.split(INSTANCE)[0]
-            if key != name and name != "cogging":
-                raise ValueError(f"effect '{key}': only cogging may occur more than once")
+            if key != name and name not in LINES:
+                raise ValueError(f"effect '{key}': only {' and '.join(LINES)} may occur more than once")
             checked({name: values}, "axis")
         return effects
 
@@ -154,6 +158,11 @@ class Axis(Settings):
     k_e: float | None
 
     @property
+    def gear_orders(self) -> Mapping[float, str]:
+        """Orders at which the gear may err, per turn of the measured side, each with what makes it."""
+        return {}
+
+    @property
     def is_force(self) -> bool:
         """Whether a measured force or torque drives."""
         return self.drive in ("force", "torque")
@@ -176,6 +185,34 @@ class RotaryAxis(Axis):
     k_e: float | None = quantity("V s/rad", "back-EMF per speed", None, gt=0, le=1e4)
     p: int | None = Field(default=None, ge=1, le=200, description="pole pairs")
     slots: int | None = Field(default=None, ge=1, le=1000, description="slots of the stator")
+    gear_kind: Literal["harmonic", "planetary", "spur"] | None = Field(
+        default=None, description="kind of the gear between motor and load: gear errors are looked for at its orders"
+    )
+    teeth: tuple[int, ...] = Field(
+        default=(),
+        description="of a planetary gear: sun, ring; of spur gears: driving and driven wheel, stage by stage",
+    )
+
+    @model_validator(mode="after")
+    def _teeth_fit(self) -> RotaryAxis:
+        fits = {"planetary": len(self.teeth) == 2, "spur": len(self.teeth) >= 2 and len(self.teeth) % 2 == 0}
+        if self.gear_kind and self.gear == 1.0:
+            raise ValueError("gear_kind needs gear: turns of the motor per turn of the load")
+        if not fits.get(self.gear_kind or "", True) or any(z < 1 for z in self.teeth):
+            raise ValueError(
+                "teeth: a planetary gear has two numbers (sun, ring), spur gears two for each stage (driving, driven)"
+            )
+        if self.gear_kind == "planetary" and self.teeth[0] >= self.teeth[1]:
+            raise ValueError(f"teeth: the sun has fewer teeth than the ring, not {self.teeth[0]} and {self.teeth[1]}")
+        return self
+
+    @property
+    def gear_orders(self) -> Mapping[float, str]:
+        """Orders at which the gear may err, per turn of the measured side, each with what makes it."""
+        if self.gear_kind is None:
+            return {}
+        turns = self.gear if self.measured_at == "load" else 1.0
+        return {n * turns: what for n, what in gear_orders(self.gear_kind, self.gear, self.teeth).items()}
 
     @property
     def inertia(self) -> float:

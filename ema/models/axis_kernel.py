@@ -8,6 +8,7 @@ A gear that gives (`gear_compliance`) takes the inertia J_l at the user out of J
 
     (J - J_l) dω_m/dt = … - T      J_l dω_l/dt = T      T = (θ_m - θ_l)/c + d (ω_m - ω_l)
 
+Dry friction stays, breaks away, keeps moving and stops, or has a memory (`ema.effects.friction_memory`).
 For a linear axis read position, speed, mass and force; the equations are the same.
 """
 
@@ -17,7 +18,8 @@ import math
 
 from numba import njit
 
-from ema.effects import cogging, inverter_drop, supply_sag, torque_term
+from ema.effects import cogging, friction_memory, inverter_drop, supply_sag, torque_term
+from ema.effects.backlash import follow
 from ema.effects.dry_friction import rubbing_speed_after, speed_after
 
 from . import jit  # noqa: F401  (sets the cache folder before anything is compiled)
@@ -33,6 +35,8 @@ OUTPUTS = ("theta_m", "w_m", "i_q", "u_q")
 _cogging = njit(inline="always")(cogging.torque)
 _applied, _commanded = supply_sag.applied, supply_sag.commanded
 shaft_torque = combined("shaft_torque", "axis", row)
+drifting_torque = combined("drifting_torque", "axis", row)
+drifting_friction = combined("drifting_friction", "axis", row)
 user_torque = combined("user_torque", "axis", row)
 static_friction = combined("static_friction", "axis", row)
 sliding_friction = combined("sliding_friction", "axis", row)
@@ -52,7 +56,8 @@ COGGING = row("cogging.amplitude")
 COMPLIANCE, J_LOAD, ZETA, LOAD_DRAG, LOAD_FRICTION = (
     row(f"gear_compliance.{name}") for name in ("compliance", "inertia", "damping", "drag", "friction")
 )
-LOAD_SHARE = row("output_load_friction.share")
+LOAD_SHARE, LOAD_SQUARE = row("output_load_friction.share"), row("quadratic_output_load_friction.per_torque")
+DEFLECTION, BRISTLE_DAMPING = row("friction_memory.deflection"), row("friction_memory.damping")
 SAG, V_DC = row("supply_sag.resistance"), row("V_dc")
 
 
@@ -60,6 +65,7 @@ SAG, V_DC = row("supply_sag.resistance"), row("V_dc")
 def torques(z, lines, terms, theta, w, i, t):
     """Torques that oppose positive motion besides dry friction.   [N m or N]"""
     tau = z[C] * w + shaft_torque(z, 0, 1, theta, w, theta, i) + user_torque(z, 0, 1, theta)
+    tau += drifting_torque(z, 0, 1, w, t, z[DT])
     for k in range(lines.shape[0]):
         tau += _cogging(theta, w, theta, i, lines[k, 0], lines[k, 1], lines[k, 2])
     for k in range(terms.shape[0]):
@@ -72,15 +78,17 @@ def torques(z, lines, terms, theta, w, i, t):
 def friction(z, lines, terms, theta, w, tau, tau_m, i, t):
     """Static and sliding friction.   [N m or N]"""
     direction = 1.0 if (w if w != 0.0 else tau) > 0.0 else -1.0
-    F_s = z[F_S] * static_friction(z, 0, 1, theta, w, theta, direction, tau_m)
-    F_d = z[F_D] * sliding_friction(z, 0, 1, theta, w, theta, direction, tau_m)
+    drift = drifting_friction(z, 0, 1, t, z[DT])
+    F_s = z[F_S] * drift * static_friction(z, 0, 1, theta, w, theta, direction, tau_m)
+    F_d = z[F_D] * drift * sliding_friction(z, 0, 1, theta, w, theta, direction, tau_m)
     for k in range(terms.shape[0]):
         if terms[k, 11] != 0.0:
             more = torque_term.value(theta, w, i, t, terms[k])
             F_s += more
             F_d += more
-    if z[LOAD_SHARE] > 0.0:
-        more = z[LOAD_SHARE] * abs(torques(z, lines, terms, theta, 0.0, i, t))
+    if z[LOAD_SHARE] > 0.0 or z[LOAD_SQUARE] > 0.0:
+        load = abs(torques(z, lines, terms, theta, 0.0, i, t))
+        more = (z[LOAD_SHARE] + z[LOAD_SQUARE] * load) * load
         F_s += more
         F_d += more
     return max(F_s, F_d, 0.0), max(F_d, 0.0)  # what keeps sliding at creep holds at rest
@@ -160,6 +168,22 @@ def loads_after(z, offsets, t, theta, follows, h_max, out):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
+def bristles_after(z, offsets, t, theta, follows, play, out):
+    """Share of friction that is built up at the end of each recorded motion, which has noise within ±`play`."""
+    s, seen = 0.0, 0.0
+    for j in range(offsets.shape[0] - 1):
+        a, b = offsets[j], offsets[j + 1]
+        if not follows[j]:
+            s, seen = 0.0, theta[a]
+        for k in range(a, b):
+            moved = follow(seen, theta[k], play) - seen
+            if moved != 0.0:
+                s = friction_memory.built_up(s, moved, z[DEFLECTION])
+            seen += moved
+        out[j] = s
+
+
+@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
 def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_max, out):
     """Simulate one window.
 
@@ -177,8 +201,9 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
         that of the second. A commanded speed is held; its loop acts once a sample, or (FAST) between samples too.
     t, drive : arrays, shape (n_times,)
         Sample times and the recorded drive.
-    start : array, shape (4,)
-        Position, speed, and by how much the load behind a gear that gives is behind in both.
+    start : array, shape (5,)
+        Position, speed, by how much the load behind a gear that gives is behind in both, and the share of friction
+        that is built up.
     slide : float
         ±1 where the axis is known to slide that way throughout: friction never turns round nor holds. 0: the full rule.
     h_max : float
@@ -189,6 +214,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
     n = t.shape[0]
     theta, w = start[0], start[1]
     theta_l, w_l = theta - start[2], w - start[3]
+    bristle, deflection = start[4], z[DEFLECTION]
     inertia = z[J] * (1.0 + z[INERTIA])
     stiffness, damping, J_l = gear(z, inertia, h_max)
     J_m = inertia - J_l
@@ -245,8 +271,15 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
                 theta_l += 0.5 * h * w_l
             w_sliding = w if slide == 0.0 else slide * max(w * slide, CREEP)
             F_s, F_d = friction(z, lines, terms, theta_mid, w_sliding, tau, tau_m, i, t_mid)
-            dw = (tau - F_d * slide) * h / J_m
-            w_next = speed_after(w, tau, F_s, F_d, h / J_m) if slide == 0.0 else w + dw
+            if friction_memory.is_slow(F_d, deflection, J_m, h):
+                bristle = friction_memory.built_up(bristle, 0.5 * h * w, deflection)
+                tau -= friction_memory.torque(bristle, w, F_d, deflection, z[BRISTLE_DAMPING], J_m)
+                w_next = w + tau * h / J_m
+                bristle = friction_memory.built_up(bristle, 0.5 * h * w_next, deflection)
+            elif slide == 0.0:
+                w_next = speed_after(w, tau, F_s, F_d, h / J_m)
+            else:
+                w_next = w + (tau - F_d * slide) * h / J_m
             theta += 0.5 * h * (w + w_next)
             dw = w_next - w
             w = w_next
@@ -330,9 +363,14 @@ def undo_angle_error(z, measured, of_position, out):
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
 def torque_along(z, lines, terms, theta, w, i, t, dT, is_force, out):
     """Accelerating torque the model sees along a measured motion: drive less everything that opposes it."""
+    bristle = 1.0 if w[0] > 0.0 else -1.0
     for k in range(theta.shape[0]):
         z[DT] = dT[k]
         tau_m = i[k] if is_force else z[K_T] * emf_factor(z, 0, 1, i[k], z[DT]) * i[k]
         tau = tau_m - torques(z, lines, terms, theta[k], w[k], i[k], t[k])
         _, F_d = friction(z, lines, terms, theta[k], w[k], tau, tau_m, i[k], t[k])
-        out[k] = tau - (F_d if w[k] > 0.0 else -F_d)
+        if z[DEFLECTION] == 0.0 or (k > 0 and t[k] < t[k - 1]):
+            bristle = 1.0 if w[k] > 0.0 else -1.0
+        elif k > 0:
+            bristle = friction_memory.built_up(bristle, theta[k] - theta[k - 1], z[DEFLECTION])
+        out[k] = tau - F_d * bristle

@@ -4,6 +4,7 @@
 ``F_d``, ``J``, ``k_t`` …   a parameter of the plant file
 ``stribeck.speed``          a parameter of a library effect
 ``cogging:72.cos``          cosine (sine) part of the cogging line of 72 periods per turn
+``gear_error:14.17.cos``    the same of a gear's line
 ``term1.coefficient``       a column of an unnamed term (`ema.effects.torque_term`)
 ``zero:NAME``               angle to be added to the positions of record NAME
 ==========================  ===============================================================
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ema.discrepancy.plant import Point
-from ema.models.axis_config import INSTANCE
+from ema.models.axis_config import INSTANCE, LINES
 
 PARAMETERS = ("J", "M", "C", "F_d", "k_t", "k_e", "R", "L")
 
@@ -31,9 +32,9 @@ class Numbers:
     zeros: dict[str, float]
 
 
-def line(order: float, part: str) -> str:
-    """Name of one part of a cogging line."""
-    return f"cogging:{order:g}.{part}"
+def line(order: float, part: str, effect: str = "cogging") -> str:
+    """Name of one part of a line of torque."""
+    return f"{effect}:{order:.8g}.{part}"
 
 
 def numbers_of(point: Point) -> Numbers:
@@ -42,25 +43,27 @@ def numbers_of(point: Point) -> Numbers:
     effects: dict[str, dict[str, float]] = {}
     terms: dict[str, dict[str, float]] = {}
     zeros: dict[str, float] = {}
-    lines: dict[float, dict[str, float]] = {}
+    lines: dict[tuple[str, float], dict[str, float]] = {}
     for name, value in point.items():
         head, _, tail = name.rpartition(".")
         if name.startswith("zero:"):
             zeros[name.removeprefix("zero:")] = value
-        elif name.startswith("cogging:"):
-            lines.setdefault(float(head.removeprefix("cogging:")), {})[tail] = value
+        elif name.startswith(tuple(f"{effect}:" for effect in LINES)):
+            effect, _, order = head.partition(":")
+            lines.setdefault((effect, float(order)), {})[tail] = value
         elif name.startswith("term"):
             terms.setdefault(head, {})[tail] = value
         elif head:
             effects.setdefault(head, {})[tail] = value
         else:
             parameters[name] = value
-    for number, (order, parts) in enumerate(sorted(lines.items()), start=1):
-        key = "cogging" if number == 1 else f"cogging{INSTANCE}{number}"
-        effects[key] = cogging_line(order, parts.get("cos", 0.0), parts.get("sin", 0.0))
+    for (effect, order), parts in sorted(lines.items()):
+        number = 1 + sum(key.split(INSTANCE)[0] == effect for key in effects)
+        key = effect if number == 1 else f"{effect}{INSTANCE}{number}"
+        effects[key] = torque_line(order, parts.get("cos", 0.0), parts.get("sin", 0.0))
     return Numbers(parameters, effects, list(terms.values()), zeros)
 
 
-def cogging_line(order: float, cos: float, sin: float) -> dict[str, float]:
+def torque_line(order: float, cos: float, sin: float) -> dict[str, float]:
     """Amplitude and phase:  c cos nθ + s sin nθ = A sin(nθ + φ)"""
     return {"amplitude": float(np.hypot(cos, sin)), "order": order, "phase": float(np.arctan2(cos, sin))}

@@ -13,7 +13,7 @@ import numpy as np
 from ema.core.records import Array, Record
 from ema.discrepancy.plant import Block, Candidate, Errors, Free, Point
 from ema.models import axis
-from ema.models.axis_config import INSTANCE, Axis
+from ema.models.axis_config import INSTANCE, LINES, Axis
 from ema.models.axis_layout import row
 
 from . import candidates, describe, structure
@@ -29,6 +29,7 @@ from .windows import START_NOISE, Bench, Window, bench, speed_noise
 from .zeros import zeros
 
 TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
+NOISE = 3.0  # deviations of the position's noise that are no way
 RUNAWAY = 1e6  # a window that runs away counts as no worse than this
 FIRST, FIRST_PART = 12, 4  # samples at least, and share of a window, to which its start state is fitted
 H_MAX = 2.5e-4  # [s] longest step of the simulation, unless the record's own period is longer than ten of them
@@ -155,9 +156,14 @@ class AxisPlant:
     def model(self, point: Point) -> axis.Model:
         """The kernel's numbers at a point."""
         n = numbers_of(point)
-        have = sum(key.split(INSTANCE)[0] == "cogging" for key in self.plant.effects)
-        effects = {_shifted(key, have): values for key, values in n.effects.items()}
+        effects = {self._shifted(key): values for key, values in n.effects.items()}
         return axis.model(self.plant, effects, n.terms, **n.parameters)
+
+    def _shifted(self, key: str) -> str:
+        """Key of an effect beside the lines that the plant file has already."""
+        name, _, number = key.partition(INSTANCE)
+        have = sum(own.split(INSTANCE)[0] == name for own in self.plant.effects)
+        return f"{name}{INSTANCE}{int(number or 1) + have}" if name in LINES and have else key
 
     def simulate(self, point: Point, blocks: Sequence[int]) -> list[Array]:
         """Outputs of each block as its record has them, shape (n_channels, n_times)."""
@@ -176,7 +182,8 @@ class AxisPlant:
         starts[:, 0] += zero
         drive = pack.bench.roles.kind
         record = (pack.offsets, pack.t, pack.drive_by(model.z[row("clock_skew.currents")]), starts)
-        out = axis.simulate(model, drive, *record, step, pack.dT, pack.slide, self.between)
+        bristles = self._bristles(pack, model)
+        out = axis.simulate(model, drive, *record, step, pack.dT, pack.slide, self.between, bristles)
         out[0] -= zero
         return out[[_KERNEL_ROW[name] for name in pack.bench.roles.outputs]]
 
@@ -246,6 +253,13 @@ class AxisPlant:
             motor = np.array([(w.position[0], w.speed[0]) for w in pack.windows])
             starts[:, 2:] = motor - axis.loads_after(model, *pack.history, step)
         return starts
+
+    def _bristles(self, pack: Pack, model: axis.Model) -> Array | None:
+        """Share of friction that is built up where windows begin, by the motion before them."""
+        if not axis.has_memory(model):
+            return None
+        play = NOISE * self._position_noise(pack.bench, pack.windows[0])
+        return axis.bristles_after(model, *pack.history, play)
 
     def _filter(self, b: Bench, w: Window) -> Filter:
         H, noise, process, damping, excursion = self._noise_model(b, w)
@@ -335,12 +349,6 @@ class AxisPlant:
 
 
 _KERNEL_ROW = {"theta_m": 0, "q": 0, "w_m": 1, "v": 1, "i_q": 2, "u_q": 3}
-
-
-def _shifted(key: str, have: int) -> str:
-    """Key of an effect beside the cogging lines that the plant file has already."""
-    name, _, number = key.partition(INSTANCE)
-    return f"cogging{INSTANCE}{int(number or 1) + have}" if name == "cogging" and have else key
 
 
 def _distinct(names: list[str]) -> list[str]:

@@ -12,17 +12,20 @@ import numpy as np
 
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
+from ema.models.axis_config import LINES
 
-from .balance.as_effects import effects
+from .balance.as_effects import effects, line_point
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
 
 SCREENED = (
     *("viscous_by_direction", "pendulum", "output_load_friction", "drive_unequal", "viscous_slope", "friction_slope"),
+    *("gear_error", "quadratic_load_friction", "quadratic_output_load_friction", "friction_memory"),
+    *("friction_drift", "viscous_drift", "friction_by_temperature", "viscous_by_temperature"),
 )
 ROOM = 10.0  # times the size that the regression found, to which a fit may go
-FIXED = ("centre",)
+FIXED = ("centre", "since", "coefficient", "damping")  # parameters that the records of one bench hardly show
 
 
 def screened(plant: AxisPlant, point: Point) -> list[Candidate]:
@@ -34,18 +37,28 @@ def screened(plant: AxisPlant, point: Point) -> list[Candidate]:
     out = []
     for term in balance.terms:
         for name, values in effects(balance, term).items():
-            if name in SCREENED and name not in have:
-                out.append(_candidate(name, values))
+            if name not in SCREENED:
+                continue
+            if name not in LINES:
+                out += [] if name in have else [_candidate(name, values)]
+            elif not line_point(name, values).keys() & point.keys():
+                out.append(_line(name, values))
     return out
+
+
+def _line(name: str, values: dict[str, float]) -> Candidate:
+    start, A = line_point(name, values), values["amplitude"]
+    free = tuple(Free(key, "N m", -ROOM * A, ROOM * A, value, 0.1 * A, 1e-3 * A) for key, value in start.items())
+    return Candidate(f"{name}:{values['order']:.5g}", name, free, (start,), dict.fromkeys(start, 0.0))
 
 
 def _candidate(name: str, values: dict[str, float]) -> Candidate:
     effect = registry()[name]
     free = []
     for p in effect.parameters:
-        value = values[p.name]
         if p.name in FIXED:
             continue
+        value = values[p.name]
         if p.name == "phase":
             free.append(Free(f"{name}.{p.name}", p.unit, value - np.pi, value + np.pi, value, 0.1))
         else:

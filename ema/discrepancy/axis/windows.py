@@ -131,7 +131,7 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
         speed = savgol_filter(raw, 2 * width - 1, 2, deriv=1, delta=dt)
     if who.position is None:
         raw = smooth = np.concatenate(([0.0], np.cumsum(np.diff(t) * 0.5 * (speed[1:] + speed[:-1]))))
-    dT = float(np.mean(cycle["temp_w"])) - T_REFERENCE if "temp_w" in cycle else 0.0
+    warmer = cycle["temp_w"] - T_REFERENCE if "temp_w" in cycle else np.zeros(n)
     cuts = _glitches(cycle, who, noise) if who.position is not None and who.speed is not None else np.array([], int)
     gaps = np.flatnonzero(np.diff(t) > 5.0 * dt) + 1
     still = np.abs(speed) < AT_REST * START_NOISE * speed_noise(who, noise, dt)
@@ -152,6 +152,7 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
                 label = f"{group}, {cycle}, {t[rows][0]:.4g} s"
                 stretch = first + int((t[rows][0] - t[0]) / max(STRETCH, length))
                 columns = (t[rows], cycle[who.drive][rows], outputs, smooth[rows], speed[rows])
+                dT = float(np.mean(warmer[rows]))
                 gap = max(gap for gap in (0, *gaps.tolist()) if gap <= part[0])
                 before = (t[gap : part[0] + 1], raw[gap : part[0] + 1])
                 course, chain = (t, cycle[who.drive]), cycle.number * 1_000_000 + gap

@@ -9,6 +9,7 @@ import numpy as np
 from ema.core.records import Array
 from ema.discrepancy.axis.naming import line
 from ema.discrepancy.plant import Point
+from ema.models.axis_config import LINES
 
 from .choice import Balance, Term
 
@@ -39,6 +40,13 @@ def friction(b: Balance) -> float:
     return value if value > 0.0 else b.plain.F_d
 
 
+def line_point(name: str, values: Values) -> dict[str, float]:
+    """Cosine and sine part of a line:  A sin(nθ + φ) = c cos nθ + s sin nθ"""
+    A, phase = values["amplitude"], values["phase"]
+    parts = {"cos": A * float(np.sin(phase)), "sin": A * float(np.cos(phase))}
+    return {line(values["order"], part, name): value for part, value in parts.items()}
+
+
 def point(b: Balance, *, linear: bool) -> Point:
     """Everything that was fitted, as the axis model takes it; laws that it has not are left out."""
     fitted = dict(zip(b.model.base, b.corrected.coefficients, strict=False))
@@ -47,10 +55,8 @@ def point(b: Balance, *, linear: bool) -> Point:
     out["M" if linear else "J"] = max(float(fitted.get("inertia", b.plain.inertia)), 0.05 * b.plain.inertia)
     for term in b.terms:
         for name, values in effects(b, term).items():
-            if name == "cogging":
-                A, phase = values["amplitude"], values["phase"]
-                out[line(values["order"], "cos")] = A * float(np.sin(phase))
-                out[line(values["order"], "sin")] = A * float(np.cos(phase))
+            if name in LINES:
+                out |= line_point(name, values)
                 continue
             for parameter, value in values.items():
                 key = f"{name}.{parameter}"
@@ -81,6 +87,28 @@ def _stretch(v: Values, F_d: float, k_t: float) -> Effects:
     return {"position_friction": {"height": v["more"] / F_d, "centre": v["centre"], "width": v["width"]}}
 
 
+def _friction_drift(v: Values, F_d: float, k_t: float) -> Effects:
+    return {"friction_drift": {"rate": v["change"] / v["span"] / F_d, "since": v["begin"]}}
+
+
+def _viscous_drift(v: Values, F_d: float, k_t: float) -> Effects:
+    return {"viscous_drift": {"rate": v["change"] / v["span"], "since": v["begin"]}}
+
+
+def _friction_by_temperature(v: Values, F_d: float, k_t: float) -> Effects:
+    return {"friction_by_temperature": {"per_kelvin": v["per_kelvin"] * v["at_20_celsius"] / F_d}}
+
+
+def _viscous_by_temperature(v: Values, F_d: float, k_t: float) -> Effects:
+    """C (exp(-k ΔT) - 1) of a negative C rises with temperature, as that of -C and -k does."""
+    k, C = v["per_kelvin"], v["at_20_celsius"]
+    return {"viscous_by_temperature": {"per_kelvin": k if C > 0.0 else -k, "coefficient": abs(C)}}
+
+
+def _quadratic_load_friction(v: Values, F_d: float, k_t: float) -> Effects:
+    return {"quadratic_load_friction": {"per_square": v["per_torque"] / F_d}}
+
+
 def _spring(v: Values, F_d: float, k_t: float) -> Effects:
     k = v["stiffness"]
     return {"spring_load": {"stiffness": k}, "constant_load": {"torque": -k * v["zero"]}}
@@ -90,15 +118,26 @@ def _unequal(v: Values, F_d: float, k_t: float) -> Effects:
     return {"drive_unequal": {"per_ampere": v["share"] * k_t}}
 
 
-_RELATIVE: tuple[_Maker, ...] = (_load_friction, _friction_slope, _stribeck, _stretch)
+_RELATIVE: tuple[_Maker, ...] = (
+    *(_load_friction, _quadratic_load_friction, _friction_slope, _stribeck, _stretch),
+    *(_friction_drift, _friction_by_temperature),
+)
 _MAKERS: Mapping[str, _Maker] = {
     "viscous_by_direction": _as_it_is("viscous_by_direction", "difference"),
     "pendulum": _as_it_is("pendulum", "amplitude", "phase"),
     "output_load_friction": _as_it_is("output_load_friction", "share"),
+    "quadratic_output_load_friction": _as_it_is("quadratic_output_load_friction", "per_torque"),
+    "quadratic_load_friction": _quadratic_load_friction,
+    "friction_memory": _as_it_is("friction_memory", "deflection"),
+    "friction_drift": _friction_drift,
+    "viscous_drift": _viscous_drift,
+    "friction_by_temperature": _friction_by_temperature,
+    "viscous_by_temperature": _viscous_by_temperature,
     "viscous_slope": _as_it_is("viscous_slope", "slope", "centre"),
     "quadratic_drag": _as_it_is("quadratic_drag", "coefficient"),
     "constant_load": _as_it_is("constant_load", "torque"),
     "cogging": _as_it_is("cogging", "amplitude", "order", "phase"),
+    "gear_error": _as_it_is("gear_error", "amplitude", "order", "phase"),
     "load_friction": _load_friction,
     "friction_slope": _friction_slope,
     "stribeck": _stribeck,

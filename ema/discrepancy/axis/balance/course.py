@@ -22,6 +22,7 @@ MOST = 60_000  # samples of all cycles together; of longer ones means of neighbo
 class Course:
     """One cycle, arrays of shape (n_times,).
 
+    `dT` is the winding's temperature less 20 °C [K].
     `drive` is the channel that drives, `current` the measured current beside a driving voltage; `position` or `speed`
     is None where it was not recorded. `noise` is the rms of each by channel name. A `static` course holds readings at
     rest, each approached in `direction`. `late`: samples by which the drive acts later than its channel says (one that
@@ -35,7 +36,7 @@ class Course:
     position: Array | None
     speed: Array | None
     current: Array | None
-    dT: float
+    dT: Array
     noise: dict[str, float]
     static: bool = False
     direction: Array | None = None
@@ -96,7 +97,8 @@ def _moving(b: Bench, cycle: Cycle, every: int, late: float) -> Course:
     current = "i_q" if who.kind == "voltage" and "i_q" in who.outputs else None
     names = {"drive": who.drive, "position": who.position, "speed": who.speed, "current": current}
     noise = {role: b.noise[name].sigma / every**0.5 for role, name in names.items() if name in b.noise}
-    dT = float(np.mean(cycle["temp_w"])) - T_REFERENCE if "temp_w" in cycle else 0.0
+    warm = of("temp_w")
+    dT = np.zeros(len(t)) if warm is None else warm - T_REFERENCE
     return Course(
         b.name, b, t, drive, of(who.position), of(who.speed), of(current), dT, noise, late=late, other=of("theta_n")
     )
@@ -105,6 +107,6 @@ def _moving(b: Bench, cycle: Cycle, every: int, late: float) -> Course:
 def _static(b: Bench) -> list[Course]:
     noise = {"drive": b.noise[b.roles.drive].sigma}
     return [
-        Course(b.name, b, w.t, w.drive, w.position, np.zeros(w.n), None, w.dT, noise, True, w.direction)
+        Course(b.name, b, w.t, w.drive, w.position, np.zeros(w.n), None, np.full(w.n, w.dT), noise, True, w.direction)
         for w in b.windows
     ]

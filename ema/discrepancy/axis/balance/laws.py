@@ -13,18 +13,23 @@ import numpy as np
 
 from ema.core.records import Array
 
+from .drifting import drifting
 from .law import Acting, Columns, Law, Values, one
 from .links import links
+from .memory import remembering
 from .regression import BY_RECORD
 from .rows import Motion
 
 N_SPEEDS, N_PLACES, N_ORDERS = 14, 12, 320  # members of a family
 SEEN_BOTH = 0.1  # share of the samples in which a drive must act each way
 LEAST_TURN = 0.3  # [rad] of travel that shows a sine of the angle apart from a straight line
+ROUNDING = 1e-9  # of the drive's torque: no load is less than this, where there is one
 HIGHEST_ORDER = 260.0
 STRETCHES = (0.05, 0.15)  # half widths of a stretch of other friction, of the travel
-TORQUE_LINE, TRAVEL_LINE = "torque line", "line along the travel"
-LINES = tuple(f"{name}{more}" for name in (TORQUE_LINE, TRAVEL_LINE) for more in ("", BY_RECORD))  # several may act
+TORQUE_LINE, TRAVEL_LINE, GEAR_LINE = "torque line", "line along the travel", "line of the gear"
+LINES = tuple(  # several may act
+    f"{name}{more}" for name in (TORQUE_LINE, TRAVEL_LINE, GEAR_LINE) for more in ("", BY_RECORD)
+)
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,9 @@ def laws(m: Motion, *, linear: bool) -> Iterator[Law]:
     )
     if moves:
         yield from _by_speed(m, u)
-        yield from _by_time(m, u)
+        yield from drifting(m, u.torque, u.place)
+        if m.has_position:
+            yield from remembering(m, u.torque, u.place)
         if min(float(np.mean(m.drive > 0.0)), float(np.mean(m.drive < 0.0))) > SEEN_BOTH:
             yield _unequal_drive()
     if m.neighbour:
@@ -167,6 +174,7 @@ def _share(side: str, power: int) -> Columns:
 
     def columns(m: Motion, acting: Acting) -> tuple[Array, ...]:
         torque = acting.motor + acting.held if side == "both" else getattr(acting, side)
+        torque = np.where(np.abs(torque) > ROUNDING * np.abs(acting.motor).max(initial=0.0), torque, 0.0)
         return (m.direction * np.abs(torque) ** power,)
 
     return columns
@@ -204,7 +212,8 @@ def _by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[
             is_friction=True,
             n_columns=2,
         )
-    yield from _lines(span, u, linear=linear)
+    yield from _gear_lines(m, span, u)
+    yield from _lines(span, u, linear=linear, but=m.gear_orders)
     yield Law(
         "friction along the travel",
         "friction along the travel",
@@ -295,12 +304,34 @@ def _pendulum(u: Units) -> Law:
     )
 
 
-def _lines(span: float, u: Units, *, linear: bool) -> Iterator[Law]:
+def _gear_lines(m: Motion, span: float, u: Units) -> Iterator[Law]:
+    """Lines at orders of the gear; one that the motion does not tell from a whole number may be the motor's, too."""
+    for n in m.gear_orders:
+        if n * span < 2.0 * np.pi:
+            continue
+        whole = round(n) >= 1 and abs(n - round(n)) * span < np.pi
+        yield Law(
+            GEAR_LINE,
+            f"gear line {n:.6g}",
+            "gear_error",
+            _line(n),
+            {"amplitude": u.torque, "order": "1/turn", "phase": "rad"},
+            _of_line(n),
+            f"gear error: a {u.said} of {{amplitude:.3g}} {u.torque} with {{order:.5g}} periods per turn",
+            "the motor alone, uncoupled from the gear; or the position at both sides of the gear",
+            also=("cogging",) if whole else (),
+            n_columns=2,
+        )
+
+
+def _lines(span: float, u: Units, *, linear: bool, but: tuple[float, ...]) -> Iterator[Law]:
     resolution = 2.0 * np.pi / span
     step = resolution if linear else max(1.0, float(np.ceil(resolution)))
     if not linear and span <= 2.0 * np.pi:
         return
     for n in np.arange(2.0 * (resolution if linear else 1.0), min(HIGHEST_ORDER * step, step * N_ORDERS), step):
+        if n in but:
+            continue  # stands among the gear's
         periods = f"once in {2.0 * np.pi / n:.3g} m of travel" if linear else "with {order:.4g} periods per turn"
         yield Law(
             TRAVEL_LINE if linear else TORQUE_LINE,
@@ -312,28 +343,4 @@ def _lines(span: float, u: Units, *, linear: bool) -> Iterator[Law]:
             f"a {u.said} of {{amplitude:.3g}} {u.torque} {periods}",
             "slow motion over the whole travel" if linear else "slow motion over a full turn, with the drive off",
             n_columns=2,
-        )
-
-
-def _by_time(m: Motion, u: Units) -> Iterator[Law]:
-    begin, span = float(m.t.min()), float(np.ptp(m.t)) or 1.0
-
-    def late(m: Motion) -> Array:
-        return (m.t - begin) / span
-
-    drifts: tuple[tuple[str, str, str, Columns], ...] = (
-        ("friction_drift", "dry friction", u.torque, lambda m, _: (m.direction * late(m),)),
-        ("viscous_drift", "viscous friction", f"{u.torque} s/{u.place}", lambda m, _: (m.w * late(m),)),
-    )
-    for name, what, unit, columns in drifts:
-        yield Law(
-            name,
-            name,
-            name,
-            columns,
-            {"change": unit},
-            one("change"),
-            f"{what} changes by {{change:+.3g}} {unit} from the start of a cycle to its end (as it warms up)",
-            "the same motion cold and warm",
-            is_friction=True,
         )

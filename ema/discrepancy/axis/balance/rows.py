@@ -44,6 +44,7 @@ class Motion:
 
     `drive` is the drive's torque; `known` what is left of it to accelerate the axis, by the plant file.
     `direction` is ±1 or, where the axis may rest, 0. `has_position` is False where the position was integrated.
+    `dT` is the winding's temperature less 20 °C [K]; `gear_orders` are those at which a gear may err, per turn.
     `other` is angle, speed and acceleration of a neighbouring axis, which is the `neighbour` "inner" or "outer" one.
     `record` is which of `records` a sample is of.
     """
@@ -61,6 +62,8 @@ class Motion:
     neighbour: str = ""
     record: NDArray[np.int_] = field(default_factory=lambda: np.empty(0, int))
     records: tuple[str, ...] = ()
+    dT: Array = field(default_factory=lambda: np.empty(0))
+    gear_orders: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -239,10 +242,11 @@ def _motion(plant: AxisPlant, model: axis.Model, c: Course, half: float) -> Moti
     rest = max(SEEN * noise, CREEP * float(np.sqrt(np.mean(w**2))))
     direction = np.where(np.abs(w) > rest, np.sign(w), 0.0)
     i, drive = _current(c, w, model.z)
-    dT = np.full(len(w), c.dT)
     is_force = c.bench.roles.kind == "force"
-    known = axis.torque_along(model, theta, w, i, c.t, dT, force=is_force)
-    motion = Motion(c.t, theta, w, a, drive, known, direction, c.position is not None, np.zeros(len(w), bool))
+    known = axis.torque_along(model, theta, w, i, c.t, c.dT, force=is_force)
+    still = np.zeros(len(w), bool)
+    motion = Motion(c.t, theta, w, a, drive, known, direction, c.position is not None, still, dT=c.dT)
+    motion = replace(motion, gear_orders=tuple(plant.plant.gear_orders))
     if c.other is None or plant.plant.neighbour is None:
         return motion
     psi, v, accelerates = local_polynomial(c.t, c.other, n_half, 3)[:3]
@@ -258,7 +262,7 @@ def _at_rest(plant: AxisPlant, model: axis.Model, c: Course) -> Motion:
     zero = np.zeros(len(c.t))
     drive = k_t * c.drive
     return Motion(
-        c.t, theta, zero, zero, drive, drive - k_t * held, c.direction, True, np.ones(len(c.t), bool)
+        c.t, theta, zero, zero, drive, drive - k_t * held, c.direction, True, np.ones(len(c.t), bool), dT=c.dT
     )  # fmt: skip
 
 
@@ -305,7 +309,8 @@ def _joined(motions: list[Motion]) -> Motion:
         return np.concatenate([getattr(m, name) for m in motions])
 
     columns = (of("t"), of("theta"), of("w"), of("a"), of("drive"), of("known"), of("direction"))
-    motion = Motion(*columns, all(m.has_position for m in motions), of("static").astype(bool))
+    motion = Motion(*columns, all(m.has_position for m in motions), of("static").astype(bool), dT=of("dT"))
+    motion = replace(motion, gear_orders=motions[0].gear_orders)
     if not all(m.neighbour for m in motions):
         return motion
     psi, v, a = (np.concatenate([m.other[k] for m in motions]) for k in range(3))

@@ -1,0 +1,111 @@
+"""What warms up, bends and meshes in a geared axis (tests/support/geared.py): named, and nothing made up."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from ema.discrepancy.axis.balance import balance
+from ema.discrepancy.axis.balance.telling import told
+from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.wording import findings
+from ema.models.axis_config import RotaryAxis
+
+WARM_UP = (22.0, 58.0, 4.0)
+
+
+@pytest.fixture(scope="module")
+def geared(support) -> ModuleType:
+    return support("geared")
+
+
+def plant_of(geared, *, temperature=False, seconds=12.0, more=(), **hidden):
+    axis = geared.Axis(**hidden)
+    model = RotaryAxis.model_validate(geared.plant(axis, **dict(more)))
+    plant = AxisPlant(model, [geared.record(axis, 1, temperature=temperature, seconds=seconds)])
+    plant.between = "held"
+    return plant
+
+
+def laws_of(geared, **how):
+    return {term["name"]: term for term in told(balance(plant_of(geared, **how)), linear=False)["terms"]}
+
+
+def test_nothing_hidden_needs_none_of_these_laws_though_it_warms_up(geared):
+    assert laws_of(geared, warms=WARM_UP, temperature=True) == {}
+
+
+def test_friction_with_memory_is_named_with_the_angle_over_which_it_builds_up(geared):
+    plant = plant_of(geared, bristle=0.15, seconds=4.0)
+    found = findings(plant, examined(plant))
+    (effect,) = found.effects
+    assert effect.name == "friction_memory"
+    assert effect.confidence > 0.9
+    assert effect.parameters["deflection"].value == pytest.approx(0.15, rel=0.2)
+    assert found.gain.heldout_after < 0.5 * found.gain.heldout_before
+
+
+def test_dry_friction_that_falls_with_a_recorded_temperature_is_named_by_it_and_not_by_time(geared):
+    (law,) = laws_of(geared, dry_per_kelvin=0.012, warms=WARM_UP, temperature=True).values()
+    assert law["name"] == "friction_by_temperature"
+    assert law["confidence"] > 0.9
+    k, F = (law["parameters"][name]["value"] for name in ("per_kelvin", "at_20_celsius"))
+    assert k * F == pytest.approx(0.012 * 0.03, rel=0.1)
+
+
+def test_viscous_friction_of_an_activation_energy_is_that_of_reynolds_exponential(geared):
+    (law,) = laws_of(geared, C=1.5e-3, viscous_activation=3000.0, warms=WARM_UP, temperature=True).values()
+    assert law["name"] == "viscous_by_temperature"
+    assert law["confidence"] > 0.9
+    k, C = (law["parameters"][name]["value"] for name in ("per_kelvin", "at_20_celsius"))
+    lost = np.exp(3000.0 * (1.0 / 331.15 - 1.0 / 293.15))
+    assert 1.5e-3 - C * (1.0 - np.exp(-38.0 * k)) == pytest.approx(1.5e-3 * lost, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("hidden", "name", "change"),
+    [
+        ({"dry_rate": -0.04}, "friction_drift", -0.04 * 12.0 * 0.03),
+        ({"viscous_rate": -0.04, "C": 1.5e-3}, "viscous_drift", -0.04 * 12.0 * 1.5e-3),
+    ],
+)
+def test_friction_that_drifts_without_a_temperature_is_a_drift(geared, hidden, name, change):
+    (law,) = laws_of(geared, **hidden).values()
+    assert law["name"] == name
+    assert law["confidence"] > 0.9
+    assert law["parameters"]["change"]["value"] == pytest.approx(change, rel=0.03)
+
+
+def test_friction_that_grows_with_the_square_of_the_motor_torque_is_named_where_there_is_no_load(geared):
+    (law,) = laws_of(geared, by_square=2.5).values()
+    assert law["name"] == "quadratic_load_friction"
+    assert law["parameters"]["per_torque"]["value"] == pytest.approx(2.5, rel=0.05)
+
+
+PLANETARY = {"gear": 6.0, "gear_kind": "planetary", "teeth": (17, 85)}
+HARMONIC = {"gear": 100.0, "gear_kind": "harmonic"}
+
+
+@pytest.mark.parametrize(
+    ("gear", "order", "name", "others"),
+    [
+        (PLANETARY, 17.0 * 85.0 / 102.0, "gear_error", []),
+        (PLANETARY, 12.0, "cogging", []),
+        (HARMONIC, 2.0, "gear_error", ["cogging"]),  # two lobes, or a stator that is oval
+        ({}, 2.0, "cogging", []),
+    ],
+)
+def test_a_torque_at_an_order_of_the_declared_gear_is_the_gear_s(geared, gear, order, name, others):
+    (law,) = laws_of(geared, more=gear, lines=((0.006, order, 0.7),), seconds=6.0).values()
+    assert law["name"] == name
+    assert law["confidence"] > 0.9
+    assert law["indistinguishable_from"] == others
+    assert law["parameters"]["amplitude"]["value"] == pytest.approx(0.006, rel=0.02)
+    assert law["parameters"]["order"]["value"] == pytest.approx(order)
+
+
+def test_a_line_between_two_motor_orders_is_none_of_the_gear_where_no_gear_is_declared(geared):
+    assert "gear_error" not in laws_of(geared, lines=((0.006, 17.0 * 85.0 / 102.0, 0.7),), seconds=6.0)
