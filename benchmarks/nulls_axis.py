@@ -2,8 +2,8 @@
 
 python -m benchmarks.nulls_axis [--trials N] [--log FILE] [--seed N]
 
-Three plants in turn, each drawn anew with its motion: a geared motor under cascaded loops that warms up, a table under a
-cascade of position and speed, a servo with a pendulum (which its plant file has) under a position loop. What was
+Three plants in turn, each drawn anew with its motion: a geared motor under cascaded loops that warms up, a table under
+a cascade of position and speed, a servo with a pendulum (which its plant file has) under a position loop. What was
 examined is appended to the log as one line of JSON; a log is continued, and printed alone with --trials 0.
 """
 

@@ -49,8 +49,8 @@ def numbers_of(point: Point) -> Numbers:
         if name.startswith("zero:"):
             zeros[name.removeprefix("zero:")] = value
         elif name.startswith(tuple(f"{effect}:" for effect in LINES)):
-            effect, _, order = head.partition(":")
-            lines.setdefault((effect, float(order)), {})[tail] = value
+            effect, _, n = head.partition(":")
+            lines.setdefault((effect, float(n)), {})[tail] = value
         elif name.startswith("term"):
             terms.setdefault(head, {})[tail] = value
         elif head:
