@@ -9,8 +9,9 @@ principal directions, and with a correlation that falls with distance:
 so that every run made so far counts, each as far as it is near; where M is far below Σ_switch the runs change nothing.
 Sticking, reversals and the ends of the play come at other instants with other faults, so e has kinks: ρ is Matérn's
 with ν = 3/2, once differentiable. How far e reaches (ℓ) and how large it is here (s) differs from one k to the next by
-more than any table could say; the runs tell by their marginal likelihood, and over what they leave open is averaged. In
-coordinates in which both Σ_switch and M are diagonal, this is one scalar process for each [1]_.
+more than any table could say, and from one direction to the next; the runs tell by their marginal likelihood, and over
+what they leave open is averaged. In coordinates in which both Σ_switch and M are diagonal, this is one scalar process
+for each [1]_, with ℓ and s of its own, of a distribution that all have in common.
 
 References
 ----------
@@ -19,22 +20,21 @@ References
 
 from __future__ import annotations
 
-from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logsumexp, softmax
+from scipy.special import softmax
 
 LENGTHS = 0.02 * 2.0 ** np.arange(6)  # ℓ that are compared, 0.02 … 0.64
 SCALES = 4.0 ** np.arange(-2.0, 2.5, 1.0)  # s that are compared, 1/16 … 16
-NEGLIGIBLE = 1e-3  # probability of an ℓ, relative to the likeliest, below which it is left out
+N_SWEEPS = 10  # in which directions tell each other what ℓ and s are usual
 
 
 class _Process(NamedTuple):
     """e given one ℓ, seen in coordinates in which it and the noise are independent.
 
     `V` (n, n): eigenvectors of ρ, η its eigenvalues; `c` (n, n_omega): the runs in them; `lam` (n_scales, n_omega):
-    variance of e for each s; `share` (n_scales, n_omega): how probable this ℓ and each s are; `gain` (n_scales, n,
+    variance of e for each s; `share` (n_scales, n_omega): how probable this ℓ with each s is; `gain` (n_scales, n,
     n_omega): λ/(1 + λ η).
     """
 
@@ -67,7 +67,7 @@ class Correction:
     def __init__(self, k: np.ndarray, y: np.ndarray, switching: np.ndarray, M: np.ndarray):
         L = np.linalg.cholesky(switching)
         lam, U = np.linalg.eigh(np.linalg.solve(L, np.linalg.solve(L, M).T))
-        self._k, self._back = k, L @ U
+        self._k, self._y, self._back = k, y, L @ U
         self._processes = self._probable(np.linalg.solve(self._back, y.T).T, np.maximum(lam, 0.0))
         self._weights = [p.weights for p in self._processes]
 
@@ -80,34 +80,53 @@ class Correction:
 
         How far they leave e open if ℓ and s were known, and how far its mean depends on ℓ and s.
         """
-        mean, left = self._mean(k), np.zeros(len(self._back))
+        return np.asarray((self._back * self._left_open(k).mean(axis=0)) @ self._back.T)
+
+    def squared_noise(self) -> np.ndarray:
+        """Square of the noise of each run, as expected now, shape (n, n_omega). [A²]"""
+        noise = self._y - self(self._k)
+        return np.asarray(noise**2 + self._left_open(self._k) @ (self._back**2).T)
+
+    def _left_open(self, k: np.ndarray) -> np.ndarray:
+        """Variance of e in each coordinate, at each point, shape (m, n_omega)."""
+        mean = self._mean(k)
+        left = np.zeros_like(mean)
         for p in self._processes:
             R = self._rho(k, p.length) @ p.V
-            open_ = p.lam[:, None] * np.maximum(1.0 - np.einsum("mn,sno->smo", R**2, p.gain), 0.0)
-            apart = np.einsum("mn,sno->smo", R, p.gain * p.c) - mean
-            left += np.sum(p.share * np.mean(open_ + apart**2, axis=1), axis=0)
-        return np.asarray((self._back * left) @ self._back.T)
+            open_ = p.lam[:, None] * np.maximum(1.0 - R**2 @ p.gain, 0.0)
+            left += np.sum(p.share[:, None] * (open_ + (R @ (p.gain * p.c) - mean) ** 2), axis=0)
+        return left
 
     def _mean(self, k: np.ndarray) -> np.ndarray:
         parts = [self._rho(k, p.length) @ w for p, w in zip(self._processes, self._weights, strict=True)]
         return np.asarray(np.sum(parts, axis=0))
 
     def _probable(self, z: np.ndarray, lam: np.ndarray) -> list[_Process]:
-        """For each ℓ that runs `z` (n, n_omega), in units of their noise, leave possible."""
+        """For each ℓ, seen in runs `z` (n, n_omega), in units of their noise."""
         found, evidence, scaled = [], [], SCALES[:, None] * lam
         for length in LENGTHS:
             eta, V = np.linalg.eigh(self._rho(self._k, length))
             c, variance = V.T @ z, 1.0 + scaled[:, None] * np.maximum(eta, 0.0)[:, None]
-            log_p = -0.5 * np.sum(np.log(variance) + c**2 / variance, axis=1)
-            of_each = logsumexp(log_p, axis=0)  # all s are as probable beforehand, and all ℓ
-            evidence.append(float(of_each.sum()))
-            found.append(_Process(length, V, c, scaled, np.exp(log_p - of_each), scaled[:, None] / variance))
-        probability = softmax(evidence)
-        kept = probability > NEGLIGIBLE * probability.max()
-        pairs = zip(compress(found, kept), probability[kept] / probability[kept].sum(), strict=True)
-        return [p._replace(share=share * p.share) for p, share in pairs]
+            evidence.append(-0.5 * np.sum(np.log(variance) + c**2 / variance, axis=1))
+            found.append(_Process(length, V, c, scaled, evidence[-1], scaled[:, None] / variance))
+        shares = _shares(np.array(evidence))
+        return [p._replace(share=share) for p, share in zip(found, shares, strict=True)]
 
     def _rho(self, k: np.ndarray, length: float) -> np.ndarray:
         """Correlation of points `k` (m, d) with the runs' points, shape (m, n)."""
         r = np.sqrt(3.0 * np.sum((k[:, None] - self._k) ** 2, axis=-1)) / length
         return np.asarray((1.0 + r) * np.exp(-r))
+
+
+def _shares(evidence: np.ndarray) -> np.ndarray:
+    """How probable each ℓ and s is in each direction, shape of `evidence` (n_lengths, n_scales, n_omega), its log.
+
+    Directions differ, but not without measure: beforehand ℓ and s are distributed in all alike, as all together say.
+    Their distribution is found by expectation maximisation; it has the weight of one direction where it is uniform.
+    """
+    n_cells, n_omega = evidence[..., 0].size, evidence.shape[-1]
+    prior = np.full(evidence.shape[:2], 1.0 / n_cells)
+    for _ in range(N_SWEEPS):
+        shares = softmax(evidence + np.log(prior)[..., None], axis=(0, 1))
+        prior = (shares.sum(axis=-1) + 1.0 / n_cells) / (n_omega + 1.0)
+    return np.asarray(shares)

@@ -19,6 +19,7 @@ from . import lf2
 from .correction import Correction
 from .estimate import Estimate
 from .gauss_newton import GaussNewton, Model
+from .local_noise import local_switching
 from .measurement import Measurement
 from .noise import NoiseModel
 from .nuisance import N_FAULTS
@@ -26,6 +27,7 @@ from .nuisance import N_FAULTS
 if TYPE_CHECKING:
     from ema.bundle import Bundle
 
+N_SWEEPS = 2  # of the runs' covariance in each step; it begins with the last step's
 SEED = 0x48460000  # of the model's noise; any but the measured actuator's own
 
 
@@ -57,13 +59,14 @@ class HfInLoop:
 
     def __init__(self, model: Model, first: GaussNewton, options: Options = Options()):  # noqa: B008 - immutable
         self.model, self.first, self.options = model, first, options
-        self.switching = first.noise.switching  # of one HF run, whatever becomes of the measurement's
+        self.switching = first.noise.switching  # of one run, at any faults
 
     def estimate(self, measurement: Measurement) -> Estimate:
         """Iterate from LF2's answer; each step adds a batch of runs about the last answer."""
         o, e = self.options, self.first.estimate(measurement)
         if np.isnan(e.k).any():
             return replace(e, method=self.method)
+        S = self.switching
         x_runs, y_runs = np.zeros((0, len(self.first.nuisance.bounds[0]))), np.zeros((0, len(measurement.i_hat)))
         for step in range(o.n_most):
             before, at = e, self.first.nuisance.point(e)
@@ -72,7 +75,11 @@ class HfInLoop:
             y = self.model(x, measurement.start) - self.first.model(x, measurement.start)
             x_runs, y_runs = np.vstack([x_runs, x]), np.vstack([y_runs, y])
             elsewhere = self._around(e, rng)  # no run was there: the truth is at none of the runs' points either
-            e = self._corrected(x_runs, y_runs, at, elsewhere, measurement).estimate(measurement)
+            M = self._error_before(at, measurement)
+            for _ in range(N_SWEEPS):
+                S = local_switching(x_runs, y_runs, S, self.switching, M)
+            correction = Correction(x_runs, y_runs, S, M)
+            e = self._corrected(correction, S, at, elsewhere, measurement).estimate(measurement)
             if step + 1 >= o.n_least and np.max(np.abs(e.k - before.k) / np.sqrt(np.diag(e.covariance))) < o.tolerance:
                 break
         return e
@@ -90,13 +97,17 @@ class HfInLoop:
         sides *= np.minimum(self.options.reach / np.linalg.norm(sides, axis=1, keepdims=True), 1.0)
         return np.clip(x + np.vstack([sides, -sides]), *nuisance.bounds)
 
+    def _error_before(self, at: np.ndarray, measurement: Measurement) -> np.ndarray:
+        """Covariance of the smooth model's error near `at` before any run, shape (n_omega, n_omega). [A²]"""
+        return self.first.noise.covariance(measurement.start, at) - self.first.noise.switching
+
     def _corrected(
-        self, x: np.ndarray, y: np.ndarray, at: np.ndarray, elsewhere: np.ndarray, measurement: Measurement
-    ) -> GaussNewton:
+        self, correction: Correction, switching: np.ndarray, at: np.ndarray, elsewhere: np.ndarray,
+        measurement: Measurement,
+    ) -> GaussNewton:  # fmt: skip
+        """Gauss–Newton on the smooth model and its correction; `switching`: covariance of one run here."""
         noise, smooth = self.first.noise, self.first.model
-        M = noise.covariance(measurement.start, at) - noise.switching
-        correction = Correction(x, y, self.switching, M)
-        own = {field.name: getattr(noise, field.name) for field in fields(NoiseModel)}
+        own = {field.name: getattr(noise, field.name) for field in fields(NoiseModel)} | {"switching": switching}
         if measurement.start is not None:
             own["start"] = own["start_k"] = np.zeros_like(noise.start)  # HF knows what the start state does
         return GaussNewton(
