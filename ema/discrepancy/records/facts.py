@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ema.core.names import CHANNELS
 from ema.core.records import Array, Record
@@ -13,6 +14,8 @@ from ema.discrepancy.axis.noise import estimate, quantum
 LONG = 1.5  # a step of time longer than so many median steps is a gap
 HELD = 3  # samples in a row at a channel's end from which it is held there
 LEVELS = 5  # values from which a channel is more than a command between some levels
+# A parabola's top step lasts at most 1/(√2 - 1) = 2.4 times as long as the next one on both its sides; twice that.
+PARABOLA = 2.0 / (np.sqrt(2.0) - 1.0)
 ENDS = 0.002  # share of a channel's samples at its end from which that is a limit, not a peak
 HIGH = (0.6, 0.95)  # upper part of the spectrum, of half the sampling rate
 FALLEN = 0.02  # power in that part, of all but the mean, below which a channel has fallen off [1]
@@ -108,24 +111,34 @@ def _channel(record: Record, name: str) -> ChannelFacts:
     step = 0.0 if constant else record.resolution.get(name) or max(quantum(part) for part in parts)
     upper = 0.0 if constant else max(_upper(part, noise) for part in parts)
     return ChannelFacts(
-        name, CHANNELS[name].unit, low, high, float(step), float(noise), _held(parts, low, high), constant, upper
+        name, CHANNELS[name].unit, low, high, float(step), float(noise), _held(parts, low, high, step), constant, upper
     )
 
 
-def _held(parts: list[Array], low: float, high: float) -> float:
+def _held(parts: list[Array], low: float, high: float, step: float) -> float:
     """Share of samples in runs at an end; none are a cycle's rest before or after, and the levels of a command."""
     if low == high or len(np.unique(np.concatenate(parts))) <= LEVELS:
         return 0.0
     n = 0
     for part in parts:
         for end in (low, high):
-            at = np.concatenate([[False], part == end, [False]])
-            edges = np.flatnonzero(np.diff(at))
-            first, last = edges[::2], edges[1::2]
-            runs = (last - first)[(first > 0) & (last < len(part))]
-            n += int(runs[runs >= HELD].sum())
+            runs, beside = _runs(part == end), _runs(np.abs(part - end) < 1.5 * step)
+            inner = [(first, last) for first, last in runs if first > 0 and last < len(part) and last - first >= HELD]
+            n += sum(last - first for first, last in inner if not _is_peak(first, last, beside))
     share = n / sum(len(part) for part in parts)
     return share if share > ENDS else 0.0
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and one past the last sample of each run of what is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+    return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _is_peak(first: int, last: int, beside: list[tuple[int, int]]) -> bool:
+    """Whether the run is the top of a smooth turn in steps: it is as slow on the next step as a parabola is there."""
+    around = max((b - a for a, b in beside if a <= first and last <= b), default=0) - (last - first)
+    return around * PARABOLA >= last - first
 
 
 def _upper(x: Array, noise: float) -> float:

@@ -12,6 +12,7 @@ from plain_axis import RATE, bench
 from ema.cli import cli
 from ema.core.csv_records import write_csv
 from ema.core.records import Cycle, Record
+from ema.discrepancy.records import channels
 
 
 def asked(record, tmp_path, *options):
@@ -19,6 +20,10 @@ def asked(record, tmp_path, *options):
     write_csv(record, path)
     done = CliRunner().invoke(cli, ["records", "check", str(path), "--json", *options], catch_exceptions=False)
     return json.loads(done.stdout)[0]
+
+
+def facts_of(record):
+    return {one.name: one for one in channels(record)}
 
 
 def agreement(answer, what):
@@ -111,3 +116,13 @@ def test_an_actuator_s_record_tells_its_gear_and_its_star(hidden, tmp_path):
     assert agreement(answer, "theta_m against theta_u")["slope"] == pytest.approx(500.0, rel=0.01)
     assert agreement(answer, "i_a + i_b + i_c")["is_fine"]
     assert (tmp_path / "p.svg").stat().st_size > 10_000
+
+
+def test_the_turns_of_a_coarse_encoder_are_no_limit(tmp_path):
+    """A sine in steps of an encoder rests at its turns for several samples; one that a stop cuts rests as abruptly."""
+    record = bench()
+    t = record.cycles[0]["t"]
+    turning = 2.0 * np.pi / 4096 * np.round(np.sin(2.0 * np.pi * t / t[-1] * 7.0) * 4096 / (2.0 * np.pi))
+    for motion, is_held in ((turning, False), (np.clip(turning, None, 0.9), True)):
+        cycle = Cycle(0, {**record.cycles[0].channels, "theta_m": motion})
+        assert (facts_of(Record((cycle,)))["theta_m"].held > 0.0) is is_held
