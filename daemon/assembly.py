@@ -49,9 +49,9 @@ def assembled(settings: DaemonSettings, ear: Ear | None = None) -> Iterator[Serv
 def _assembled(settings: DaemonSettings, ear: Ear) -> Iterator[Service]:
     codec, port = default(), ear.port
     bundles = load_bundles(settings)
-    configuration = text(settings)
-    identity = Identity.of(bundles, configuration)
     alarm_settings = load_alarms(settings)
+    configuration, thresholds = text(settings), text(alarm_settings)
+    identity = Identity.of(bundles, configuration, thresholds)
     monitor = Monitor(bundles, codec, settings.monitor)
     local = Runner(bundles, [method for method in settings.monitor.slower if method not in settings.remote]).run
     bundles = {number: bundle.essence for number, bundle in bundles.items()}  # identifiers have what they need
@@ -64,7 +64,7 @@ def _assembled(settings: DaemonSettings, ear: Ear) -> Iterator[Service]:
         codec.path.name: codec.path,
         "daemon.yaml": configuration,
         ATTACHMENT: identity.as_json(),
-        "alarms.yaml": text(alarm_settings),
+        "alarms.yaml": thresholds,
         **_manifests(bundles),
     }
     log_settings = LogSettings(**settings.log.model_dump(exclude={"directory"}))

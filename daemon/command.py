@@ -62,7 +62,7 @@ def daemon(config_path: Path, bus: str | None, log_path: str | None) -> None:
         started = False
         try:
             with assembled(settings, ear) as service:
-                reloader = Reloader(settings, read, service.log, service.desk)
+                reloader = Reloader(settings, read, service.log, service.desk, service.identity)
                 signals.decide(
                     {
                         **dict.fromkeys(signals.STOPPING, service.stop),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,14 +28,18 @@ class Identity:
     signers: Mapping[int, str]
 
     @classmethod
-    def of(cls, bundles: Mapping[int, Bundle], configuration: bytes) -> Identity:
-        """Identity of a monitor with these bundles; `configuration` as the log holds it."""
+    def of(cls, bundles: Mapping[int, Bundle], *configuration: bytes) -> Identity:
+        """Identity of a monitor; `configuration`: daemon.yaml and alarms.yaml, as the log holds them."""
         return cls(
             version(),
-            hashlib.sha256(configuration).hexdigest(),
+            _digest(configuration),
             {number: bundle.sha256 for number, bundle in bundles.items()},
             {number: bundle.signed_by for number, bundle in bundles.items()},
         )
+
+    def configured(self, *configuration: bytes) -> Identity:
+        """The same monitor with another configuration."""
+        return replace(self, configuration=_digest(configuration))
 
     def as_json(self) -> bytes:
         """For the log."""
@@ -60,6 +64,10 @@ class Identity:
             "patch": int(patch),
             "changed": int(dirty is not None),
         }
+
+
+def _digest(texts: Iterable[bytes]) -> str:
+    return hashlib.sha256(b"".join(texts)).hexdigest()
 
 
 def _words(digits: str, count: int) -> np.ndarray:

@@ -10,7 +10,8 @@ from ema.core.errors import EmaError
 from ema.log import LogSettings, LogWriter
 
 from .alarming import AlarmDesk
-from .settings import DaemonSettings, load_alarms, text
+from .identity import ATTACHMENT, Identity
+from .settings import DaemonSettings, fingerprints, load_alarms, text
 
 # Keys whose change touches no estimate. Thresholds of alarms are logged where they change, and a replay follows.
 CHANGEABLE = (*(f"log.{name}" for name in LogSettings.model_fields), "alarms.file")
@@ -27,26 +28,46 @@ class Reloader:
         The configuration as it is now, with what the command line says instead.
     log : LogWriter
     desk : AlarmDesk
+    identity : Identity
+
+    Attributes
+    ----------
+    identity : Identity
+        With the hash of the configuration that holds now.
     """
 
-    def __init__(self, settings: DaemonSettings, read: Callable[[], DaemonSettings], log: LogWriter, desk: AlarmDesk):
+    def __init__(
+        self,
+        settings: DaemonSettings,
+        read: Callable[[], DaemonSettings],
+        log: LogWriter,
+        desk: AlarmDesk,
+        identity: Identity,
+    ):
         self._settings, self._read, self._log, self._desk = settings, read, log, desk
+        self.identity = identity
 
     def reload(self) -> tuple[bool, str]:
         """Whether the configuration was taken over, and what happened in words; the log begins a new segment anyway."""
         try:
             new = self._read()
             alarms = load_alarms(new)
+            there = fingerprints(new)
         except EmaError as error:
             return self._refused(str(error))
         changed = dict(_differences(_plain(self._settings), _plain(new)))
         fixed = sorted(key for key in changed if key not in CHANGEABLE)
         if fixed:
             return self._refused(f"{', '.join(fixed)} cannot change while it runs (restart it)")
+        others = [new.actuators[n].bundle for n, used in self.identity.bundles.items() if there[n] != used]
+        if others:
+            return self._refused(f"{others[0]} holds another bundle than the one in use (restart it)")
         thresholds = dict(_differences(_plain(self._desk.alarms.settings), _plain(alarms), "alarms.yaml"))
         self._settings = new
         log = LogSettings(**new.log.model_dump(exclude={"directory"}))
-        self._log.cut(log, {"daemon.yaml": text(new), "alarms.yaml": text(alarms)})
+        texts = {"daemon.yaml": text(new), "alarms.yaml": text(alarms)}
+        self.identity = self.identity.configured(*texts.values())
+        self._log.cut(log, {**texts, ATTACHMENT: self.identity.as_json()})
         if thresholds:
             self._desk.retake(alarms, time.time_ns())
         both = sorted((changed | thresholds).items())

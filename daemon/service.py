@@ -119,6 +119,12 @@ class Service:
         """Where alarms are raised."""
         return self._desk
 
+    @property
+    def identity(self) -> Identity:
+        """What is told of the software, the bundles and the configuration."""
+        assert self._identity is not None
+        return self._identity
+
     def ask(self, what: Callable[[], None]) -> None:
         """Have the loop do something at its next turn; may be called from a signal handler."""
         self._asked.append(what)
@@ -132,6 +138,8 @@ class Service:
         """Read the configuration again and say what came of it."""
         self._work_off()  # by the thresholds that held when it came
         taken, words = reloader.reload()
+        if reloader.identity is not self._identity:
+            self._identity, self._identified = reloader.identity, -np.inf  # told with the next heartbeat
         self._event(Level.INFO if taken else Level.WARNING, "reloaded" if taken else "reload_refused", words)
 
     def cut_log(self) -> None:

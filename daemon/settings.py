@@ -9,7 +9,7 @@ import yaml
 from pydantic import Field, model_validator
 
 from ema.alarms import AlarmSettings
-from ema.bundle import Bundle
+from ema.bundle import Bundle, fingerprint
 from ema.bundle import load as load_bundle
 from ema.bus import codec
 from ema.bus.identifiers import N_ACTUATORS
@@ -153,3 +153,10 @@ def load_bundles(settings: DaemonSettings) -> dict[int, Bundle]:
                 f"{one.bundle}: was made for actuator '{bundle.plant.name}' with other parameters than {one.plant}"
             )
     return bundles
+
+
+def fingerprints(settings: DaemonSettings) -> dict[int, str]:
+    """The hash of each actuator's bundle as it is on the disk now; BundleError where that would be refused."""
+    trusted = [load_trusted(Path(path)) for path in settings.trusted_keys]
+    found = {path: fingerprint(path, trusted) for path in {one.bundle for one in settings.actuators.values()}}
+    return {number: found[one.bundle] for number, one in settings.actuators.items()}

@@ -87,7 +87,7 @@ class Bundle:
     @property
     def sha256(self) -> str:
         """Hash of the whole bundle: of the manifest's content, which holds those of the arrays."""
-        return hashlib.sha256(json.dumps(self.manifest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+        return _hash(self.manifest)
 
     @cached_property
     def plant(self) -> Actuator:
@@ -239,6 +239,30 @@ def load(path: str | Path, trusted: Sequence[TrustedKey] = ()) -> Bundle:
     With `trusted` keys its manifest must be signed by one of them, and that comes before anything it says.
     """
     path = Path(path)
+    manifest, signed_by = _manifest(path, trusted)
+    manifest_path = path / "manifest.json"
+    try:
+        entries = validate(manifest, _Manifest, manifest_path).arrays
+        arrays = {name: _array(path, name, entry.sha256) for name, entry in entries.items()}
+        bundle = Bundle(path, manifest, arrays, signed_by)
+        _check(bundle)
+    except ConfigError as error:
+        raise BundleError(str(error)) from error
+    return bundle
+
+
+def fingerprint(path: str | Path, trusted: Sequence[TrustedKey] = ()) -> str:
+    """`Bundle.sha256` of the bundle that is there now, by its manifest alone; refused as by `load`."""
+    manifest, _ = _manifest(Path(path), trusted)
+    return _hash(manifest)
+
+
+def _hash(manifest: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(manifest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def _manifest(path: Path, trusted: Sequence[TrustedKey]) -> tuple[dict[str, Any], str]:
+    """The manifest and who has signed it."""
     manifest_path = path / "manifest.json"
     try:
         content = require_file(manifest_path).read_bytes()
@@ -260,14 +284,7 @@ def load(path: str | Path, trusted: Sequence[TrustedKey] = ()) -> Bundle:
         )
     if manifest.get("order_of_k") != list(FAULTS):
         raise BundleError(f"{manifest_path}: order of k is not {', '.join(FAULTS)}")
-    try:
-        entries = validate(manifest, _Manifest, manifest_path).arrays
-        arrays = {name: _array(path, name, entry.sha256) for name, entry in entries.items()}
-        bundle = Bundle(path, manifest, arrays, signed_by)
-        _check(bundle)
-    except ConfigError as error:
-        raise BundleError(str(error)) from error
-    return bundle
+    return manifest, signed_by
 
 
 def _array(path: Path, name: str, sha256: str) -> np.ndarray:

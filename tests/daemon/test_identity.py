@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from ema_daemon.assembly import assembled
 from ema_daemon.identity import ATTACHMENT, Identity
+from ema_daemon.reload import Reloader
 from ema_daemon.settings import load
 
 from ema.bus.codec import default
 from ema.bus.interface import open_bus
+from ema.core import resources
 from ema.core.version import version
 from ema.log import LogReader
 
@@ -77,3 +79,32 @@ def test_the_daemon_tells_it_at_its_start_and_in_its_log(write_config, coarse_bu
         kept = json.loads(log.attachments()[ATTACHMENT])
     assert kept["bundles"]["0"]["sha256"] == coarse_bundle.sha256
     assert coarse_bundle.sha256.startswith(hexadecimal(message.decode(np.array(heard))["bundle"][0]))
+
+
+def test_thresholds_read_again_are_another_configuration_on_the_bus_at_once(write_config, tmp_path):
+    thresholds = tmp_path / "alarms.yaml"
+    thresholds.write_text(resources.config("alarms.yaml").read_text())
+    bus = {"interface": "virtual", "channel": "identity-again"}
+    path = write_config(bus=bus, alarms={"file": "alarms.yaml"}, supervision={"listen": 0.0})
+    settings, message = load(path), default().messages["Identification"]
+
+    def told_next(listener):
+        end = time.monotonic() + 30
+        while time.monotonic() < end:
+            frames = listener.read(0.1)
+            heard = message.decode(frames[frames["id"] == message.frame_id])["configuration"]
+            if heard.size:
+                return hexadecimal(heard[0])
+        raise AssertionError("no Identification")
+
+    with open_bus(settings.bus) as listener, assembled(settings) as service:
+        before = service.identity.configuration
+        reloader = Reloader(settings, lambda: load(path), service.log, service.desk, service.identity)
+        thread = threading.Thread(target=service.run)
+        thread.start()
+        assert before.startswith(told_next(listener))
+        thresholds.write_text(thresholds.read_text().replace("hysteresis: 0.2", "hysteresis: 0.3"))
+        service.ask(lambda: service.reload(reloader))
+        assert told_next(listener) not in before  # well before the ten seconds after which it is told again anyway
+        service.stop()
+        thread.join(30)

@@ -1,6 +1,9 @@
 """Every signal is decided: none but SIGTERM, SIGINT and SIGPWR ends the daemon, and those end it in order."""
 
+import hashlib
+import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -11,11 +14,12 @@ from types import SimpleNamespace
 import pytest
 import yaml
 from ema_daemon import signals
+from ema_daemon.identity import ATTACHMENT, Identity
 from ema_daemon.reload import Reloader
-from ema_daemon.settings import load, load_alarms
+from ema_daemon.settings import load, load_alarms, text
 
 from ema.core import resources
-from ema.log import LogReader, LogSettings, LogWriter, schemas
+from ema.log import LogReader, LogSettings, LogWriter, contents, schemas
 from ema.log.segmented import SegmentedLog
 
 EMA = Path(sys.executable).with_name("ema")
@@ -32,13 +36,15 @@ class Desk:
 
 
 @pytest.fixture
-def reloader(write_config, tmp_path):
+def reloader(write_config, coarse_bundle, tmp_path):
     thresholds = tmp_path / "alarms.yaml"
     thresholds.write_text(resources.config("alarms.yaml").read_text())
-    path = write_config(alarms={"file": "alarms.yaml"})
+    shutil.copytree(coarse_bundle.path, tmp_path / "bundle")
+    path = write_config(alarms={"file": "alarms.yaml"}, actuators={0: {"bundle": "bundle"}})
     settings = load(path)
+    identity = Identity.of({0: coarse_bundle}, text(settings), text(load_alarms(settings)))
     with LogWriter(settings.log.directory, {"daemon.yaml": path}, LogSettings(keep_free=0)) as log:
-        yield Reloader(settings, lambda: load(path), log, Desk(load_alarms(settings))), path, log
+        yield Reloader(settings, lambda: load(path), log, Desk(load_alarms(settings)), identity), path, log
 
 
 def _change(path, **sections):
@@ -69,6 +75,44 @@ def test_thresholds_of_alarms_are_read_again_or_refused(reloader):
     assert one._desk.alarms.settings.hysteresis == 0.3
 
 
+def test_the_hash_of_the_configuration_is_that_of_what_was_read_again(reloader):
+    one, path, log = reloader
+    before = one.identity
+    assert one.reload()[0]
+    assert one.identity == before
+    thresholds = path.with_name("alarms.yaml")
+    thresholds.write_text(thresholds.read_text().replace("hysteresis: 0.2", "hysteresis: 0.3"))
+    assert one.reload()[0]
+    assert one.identity.configuration != before.configuration
+    assert one.identity.bundles == before.bundles
+    log.event(contents.event(10**18, "info", "reloaded", "", None))
+    log.close()
+    with LogReader(max(path.with_name("log").iterdir())) as back:
+        kept = back.attachments()
+    told = json.loads(kept[ATTACHMENT])["configuration"]
+    assert told == one.identity.configuration
+    assert told == hashlib.sha256(kept["daemon.yaml"] + kept["alarms.yaml"]).hexdigest()
+
+
+def test_a_bundle_that_is_another_one_now_is_told_and_nothing_is_taken_over(reloader):
+    one, path, _ = reloader
+    manifest = path.with_name("bundle") / "manifest.json"
+    sound = manifest.read_text()
+    manifest.write_text(json.dumps(json.loads(sound) | {"builder_hash": "another"}))
+    thresholds = path.with_name("alarms.yaml")
+    thresholds.write_text(thresholds.read_text().replace("hysteresis: 0.2", "hysteresis: 0.3"))
+    taken, words = one.reload()
+    assert not taken
+    assert "bundle holds another bundle than the one in use (restart it)" in words
+    assert one._desk.alarms.settings.hysteresis == 0.2
+    manifest.write_text("{")
+    taken, words = one.reload()
+    assert not taken
+    assert "manifest.json: is damaged" in words
+    manifest.write_text(sound)
+    assert one.reload()[0]
+
+
 @pytest.mark.parametrize(
     ("section", "values", "words"),
     [
@@ -96,9 +140,9 @@ def test_a_new_segment_carries_the_configuration_that_holds_from_there_on(tmp_pa
     log.write(schemas.EVENT.encode({"t_ns": 10**18, "level": "info", "code": "x", "text": "2", "actuator": None}))
     log.close()
     first, second = sorted(tmp_path.iterdir())
-    for path, text, said in ((first, b"old", "1"), (second, b"new", "2")):
+    for path, configuration, said in ((first, b"old", "1"), (second, b"new", "2")):
         with LogReader(path) as back:
-            assert back.attachments()["daemon.yaml"] == text
+            assert back.attachments()["daemon.yaml"] == configuration
             assert [m.content["text"] for m in back.messages()] == [said]
 
 
