@@ -160,6 +160,8 @@ def test_thresholds_changed_while_it_runs_hold_from_there_on_and_in_a_replay(flo
     changed = AlarmSettings.model_validate(shipped_with(THRESHOLDS | high))
 
     class Reload:
+        identity = None  # of a loop without one
+
         def __init__(self, service):
             self.log, self.desk = service.log, service.desk
 
