@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 # Which module examines which kind of plant.
 EXAMINERS = {"ema": "ema.discrepancy.actuator", "axis": "ema.discrepancy.axis"}
+N_LEADING = 3  # sets that are told
 
 
 @click.command(short_help="What the simulation gets wrong: name the cause, extend the model, measure the gain.")
@@ -82,6 +83,10 @@ def discrepancy(
     else:
         for sentence in findings.sentences():
             click.echo(sentence)
+        for line in _leading(findings.posterior):
+            click.echo(line)
+        if findings.next_recording:
+            click.echo(f"{findings.next_recording['sentence']}.")
         g = findings.gain
         if g.folds is not None and findings.effects:
             click.echo(g.folds.sentence(g.scale, g.unit))
@@ -140,6 +145,12 @@ def _examined(
             raise
         write_report(report, name, records, findings, pictures)
     return findings
+
+
+def _leading(posterior: Sequence[dict[str, Any]]) -> list[str]:
+    """The likeliest sets in one line, where there is more than one that is not ruled out."""
+    told = [f"{' + '.join(s['effects']) or 'faults alone'} {s['probability']:.2f}" for s in posterior[:N_LEADING]]
+    return [f"Probabilities of the sets fitted: {', '.join(told)}."] if told else []
 
 
 def _read(paths: Sequence[Path], plan: Sidecar | None = None) -> tuple[list[Record], list[str]]:

@@ -103,6 +103,10 @@ class Findings:
         Sets of causes with their probability, likeliest first: ``effects``, ``faults`` above 1 %, ``probability``,
         ``nats_behind`` the likeliest and ``nats_error``, what other seeds would make of that. Of the sets that were
         fitted only; empty where none was weighed.
+    next_recording : dict
+        Motions that would tell the answer from what it is not told from: the two sets (``between``), how many
+        ``cycles``, and of each of the ``motions`` the standard ``deviations`` by which simulation has the sets apart,
+        with a ``sentence``. Empty where nothing is left to be told apart.
     seeds : dict
         Of the simulations that the answer rests on, where there are any.
     balance : dict
@@ -124,6 +128,7 @@ class Findings:
     rest: float = 0.0
     rejected: list[dict[str, Any]] = field(default_factory=list)
     posterior: list[dict[str, Any]] = field(default_factory=list)
+    next_recording: dict[str, Any] = field(default_factory=dict)
     seeds: dict[str, int] = field(default_factory=dict)
     balance: dict[str, Any] = field(default_factory=dict)
     leading: list[dict[str, Any]] = field(default_factory=list)
@@ -152,6 +157,7 @@ class Findings:
                 **({"folds": g.folds.as_dict()} if g.folds else {}),
             },
             **({"posterior": self.posterior} if self.posterior else {}),
+            **({"next_recording": self.next_recording} if self.next_recording else {}),
             "rejected": self.rejected,
             "tried": self.tried,
             "notes": self.notes,

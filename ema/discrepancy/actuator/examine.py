@@ -16,6 +16,7 @@ from .cycles import Measured
 from .entrants import as_told, weighed
 from .gear import swinging
 from .growing import beside, growing, said, widened
+from .next_recording import next_recording
 from .noise import Noise, Verdict
 from .paths import beside_steady, faults_only, gone_on, resume, shortest, with_faults
 from .plant import EmaPlant
@@ -122,6 +123,7 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
     if of_each is not None and after.effects:
         after = widened(search, after)
     findings = replace(told(search, before, after, v, alike), posterior=as_told(weighed(search, before, after)))
+    findings = replace(findings, next_recording=next_recording(search, after, alike, findings.posterior))
     if findings.verdict == "adequate":
         conditions.extend(path.as_well)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
