@@ -39,13 +39,18 @@ class Corrected:
 
 
 def attenuation(
-    plant: AxisPlant, courses: list[Course], halves: dict[str, float], plain: Plain, model: Regression
+    plant: AxisPlant,
+    courses: list[Course],
+    halves: dict[str, float],
+    plain: Plain,
+    model: Regression,
+    unsure: float,
 ) -> Corrected:
     """Coefficients of `model` with the effect of the sensors' noise undone."""
     rng = np.random.default_rng(0)
     moved = []
     for _ in range(N_DRAWS if any(not c.static for c in courses) else 0):
-        noisier = rows(plant, [c if c.static else c.disturbed(rng) for c in courses], halves)
+        noisier = rows(plant, [c if c.static else c.disturbed(rng) for c in courses], halves, unsure)
         if noisier is not None:
             again = fitted(noisier, plain, model.laws)
             if again.base == model.base:

@@ -11,14 +11,15 @@ import numpy as np
 from ema.core.records import Array
 from ema.models.axis_config import LinearAxis
 
-from .agreement import Agreement, against, agreements
+from .agreement import INEXACT, Agreement, against, agreements
 from .apart import apart
 from .attenuation import Corrected, attenuation
 from .course import Course, courses
 from .law import Acting, Law
 from .laws import LINEAR, LINES, ROTARY, laws, of_base
+from .links import LINKS, links
 from .regression import BY_RECORD, Plain, Regression, fitted
-from .rows import Rows, half_widths, rows
+from .rows import LONGEST, STILL, Rows, half_widths, rows
 
 if TYPE_CHECKING:
     from ema.discrepancy.axis.plant import AxisPlant
@@ -31,6 +32,8 @@ SELDOM = 0.05  # share of draws that another law must win to be one that the rec
 CONSTANT = 0.02  # share by which a voltage must change to drive by more than its value
 APART = 0.05  # of a law's size that must stand out of what inertia, dry friction and drag do
 N_WIDTHS = 3  # rounds
+N_WIDER = 3  # times that test functions are made twice as wide
+LONG = 0.5  # share of a row that must show which way friction acts, however small that is
 BY_NAME = BY_RECORD.replace(" ", "_")
 N_DRAWS = 400  # of blocks, to see how often a law wins
 
@@ -68,6 +71,8 @@ class Balance:
         What the sensors' noise leaves.
     agreements : tuple of Agreement
         Where several records are given: each coefficient record by record.
+    given : tuple of Law
+        What the plant file declares beside inertia, friction and drag: a neighbouring axis.
     """
 
     model: Regression
@@ -80,6 +85,7 @@ class Balance:
     left: float
     noise: float
     agreements: tuple[Agreement, ...] = ()
+    given: tuple[Law, ...] = ()
 
     def confidence(self, term: Term) -> float:
         """How often the law wins, times its mark over that and what of the rest it may have been taken for.
@@ -107,28 +113,66 @@ def balance(plant: AxisPlant) -> Balance | None:
     if _is_given(plant, recorded, found):
         return None
     size = float(np.sqrt(np.mean(found.drive**2)))
-    answer, widths = None, None
+    answer, widths, unsure = None, None, 0.0
     for _ in range(N_WIDTHS):  # how wide test functions must be depends on what stands beside the acceleration
         first = answer.model if answer is not None else fitted(found, plain, [])
         wider = half_widths(recorded, _heaviest(first, p.inertia), size)
         if widths is not None and all(wider[name] <= widths[name] for name in wider):
             break
         widths = wider if widths is None else {name: max(wider[name], widths[name]) for name in wider}
-        found = rows(plant, recorded, widths) or found
-        answer = chosen(found, plain, shown_by(found, list(every_law(found, linear=linear))))
+        unsure = unsure_share(first, plain, size)
+        found = rows(plant, recorded, widths, unsure) or found
+        answer = chosen(found, plain, shown_by(found, list(every_law(found, linear=linear))), given(found))
     assert answer is not None
     assert widths is not None
+    for _ in range(N_WIDER):
+        wide = {name: 2.0 * half for name, half in widths.items()}
+        slower = rows(plant, recorded, wide, unsure)
+        if slower is None or _has_no_room(recorded, wide) or not _is_moved(answer.model, slower, plain):
+            break
+        found, widths = slower, wide
+        answer = chosen(found, plain, shown_by(found, list(every_law(found, linear=linear))), given(found))
     return replace(
         answer,
-        corrected=attenuation(plant, recorded, widths, plain, answer.model),
+        corrected=attenuation(plant, recorded, widths, plain, answer.model, unsure),
         agreements=tuple(agreements(found, plain, answer.model)),
     )
+
+
+def _has_no_room(recorded: Sequence[Course], widths: dict[str, float]) -> bool:
+    return any(not c.static and float(np.ptp(c.t)) < LONGEST * widths[c.record] for c in recorded)
+
+
+def _is_moved(model: Regression, slower: Rows, plain: Plain) -> bool:
+    """Whether slower test functions give another inertia: then the quick part of the motion is none that the laws make.
+
+    A frame that swings, a gear that gives or noise beyond what the sensors are known to have takes from every
+    coefficient, the more the narrower test functions are (Hausman, "Specification tests in econometrics",
+    Econometrica 46, 1978).
+    """
+    if "inertia" not in model.base:
+        return False
+    other = fitted(slower, plain, model.laws)
+    if other.base != model.base:
+        return False
+    k = model.base.index("inertia")
+    here, there = float(model.coefficients[k]), float(other.coefficients[k])
+    spread = float(np.sqrt(abs(other.covariance()[k, k] - model.covariance()[k, k])))
+    return abs(there - here) > max(CLEAR * spread, INEXACT * max(abs(here), abs(there)))
 
 
 def every_law(found: Rows, *, linear: bool) -> list[Law]:
     """Laws that all records share, and each with own coefficients by record."""
     shared = list(laws(found.motion, linear=linear))
     return [*shared, *apart(found.motion, shared, of_base(LINEAR if linear else ROTARY))]
+
+
+def unsure_share(model: Regression, plain: Plain, drive: float) -> float:
+    """Share of a row in which friction may act either way, or less than in sliding, and be no more than noise."""
+    if "dry_friction" not in model.base:
+        return 0.0
+    F_d = plain.F_d + float(model.coefficients[model.base.index("dry_friction")])
+    return min(STILL * drive / max(abs(F_d), 1e-300), LONG)
 
 
 def _is_given(plant: AxisPlant, recorded: Sequence[Course], found: Rows) -> bool:
@@ -166,12 +210,17 @@ def _heaviest(model: Regression, inertia: float) -> float:
     return float(np.max(np.abs(found)))
 
 
-def chosen(found: Rows, plain: Plain, every: Sequence[Law]) -> Balance:
-    """Forward and backward selection."""
+def given(found: Rows) -> list[Law]:
+    """Laws that the plant file declares: of a neighbouring axis."""
+    return [links(found.motion)] if found.motion.neighbour else []
+
+
+def chosen(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence[Law] = ()) -> Balance:
+    """Forward and backward selection beside the laws that are `given`."""
     n = int(found.whole.sum())
     drive = float(np.var(found.drive[found.whole]))
-    base = fitted(found, plain, [])
-    model = base
+    base = fitted(found, plain, given)
+    model, declared = base, {law.key for law in given}
     while len(model.laws) < MOST_LAWS:
         trials = _trials(found, plain, model, every)
         best = _simplest(trials, drive * n)
@@ -180,11 +229,12 @@ def chosen(found: Rows, plain: Plain, every: Sequence[Law]) -> Balance:
         model = _revised(found, plain, best, every, drive * n)
     while (fewer := _exchanged(found, plain, model, every, drive * n)) is not None:
         model = fewer
-    terms = tuple(_term(found, plain, model, law, every) for law in model.laws)
+    terms = tuple(_term(found, plain, model, law, every) for law in model.laws if law.key not in declared)
     return Balance(
         model, Corrected(model.coefficients, model.covariance()), plain, terms, drive,
         float(np.mean((found.y - plain.inertia * found.alpha)[found.whole] ** 2)),
         base.loss / n, model.loss / n, float(np.mean(found.sigma[found.whole] ** 2)),
+        given=tuple(given),
     )  # fmt: skip
 
 
@@ -207,10 +257,15 @@ def _trials(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) 
     for law in every:
         if law.key not in have and law.family not in single:
             members.setdefault(law.family, []).append(law)
-    return [fitted(found, plain, [*model.laws, _best(found, model, own)]) for own in members.values()]
+    return [fitted(found, plain, _with(model, _best(found, model, own))) for own in members.values()]
 
 
-HOLDS = {"spring": ("constant",), "links": ("pendulum",)}  # a spring has its own zero
+def _with(model: Regression, law: Law) -> list[Law]:
+    """The laws of a model and one more; that one by record takes the place of the same for all."""
+    return [*(own for own in model.laws if law.repeats is None or own.key != law.repeats.key), law]
+
+
+HOLDS = {"spring": ("constant",), LINKS: ("pendulum",)}  # a spring has its own zero
 
 
 def _held(family: str) -> tuple[str, ...]:
@@ -246,8 +301,8 @@ def _is_needed(new: Regression, old: Regression, whole: float) -> bool:
 def _revised(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], whole: float) -> Regression:
     """Without laws that later ones made superfluous, or with another in their place that does clearly better."""
     for law in model.laws[:-1]:
-        if law.family in LINES:
-            continue  # lines stand beside each other
+        if law.family in (*LINES, LINKS):
+            continue  # lines stand beside each other, and a neighbour is declared
         without = fitted(found, plain, [own for own in model.laws if own.key != law.key])
         if not _is_needed(model, without, whole):
             model = without
@@ -260,7 +315,7 @@ def _revised(found: Rows, plain: Plain, model: Regression, every: Sequence[Law],
 
 def _exchanged(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], whole: float) -> Regression | None:
     """A model of fewer laws that leaves no more: one law may do what several stood in for."""
-    single = [law for law in model.laws if law.family not in LINES]
+    single = [law for law in model.laws if law.family not in (*LINES, LINKS)]
     for trial in _trials(found, plain, model, every) if len(single) > 1 else ():
         reduced = trial
         for law in single:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ema.core.records import Array
@@ -48,6 +48,8 @@ class Law:
     needs_acting : bool
         Whether its columns depend on what else acts.
     n_columns : int
+    weak : function motion → pairs of arrays (n_samples,)
+        Where a column is f + dp/dt: f and p, so that no derivative of p is taken.
     repeats : Law or None
         The law of which it has the columns once for each record.
     """
@@ -65,6 +67,7 @@ class Law:
     needs_acting: bool = False
     n_columns: int = 1
     repeats: Law | None = None
+    weak: Callable[[Motion], Sequence[tuple[Array, Array]]] | None = None
 
 
 def one(name: str, **shape: float) -> Values:

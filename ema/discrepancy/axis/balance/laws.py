@@ -15,7 +15,7 @@ from ema.core.records import Array
 
 from .drifting import drifting
 from .law import Acting, Columns, Law, Values, one
-from .links import links
+from .links import coupled_friction
 from .memory import remembering
 from .regression import BY_RECORD
 from .rows import Motion
@@ -77,7 +77,7 @@ def laws(m: Motion, *, linear: bool) -> Iterator[Law]:
         if min(float(np.mean(m.drive > 0.0)), float(np.mean(m.drive < 0.0))) > SEEN_BOTH:
             yield _unequal_drive()
     if m.neighbour:
-        yield links(m)
+        yield from coupled_friction(u.torque)
     yield from _by_load(u)
     if m.has_position and float(np.ptp(m.theta)) > 0.0:
         yield from _by_position(m, u, moves=moves, linear=linear)

@@ -12,6 +12,7 @@ from ema.core.records import Array
 from .law import Acting, Law
 from .rows import N_FOLDS, Rows
 
+LEAST = 1e-8  # of the largest eigenvalue, below which a direction rests on the block that is left out alone
 N_ROUNDS = 6  # of laws that depend on what else acts, which depends on them
 BY_RECORD = " by record"  # in the name of what is fitted once for each
 
@@ -94,7 +95,7 @@ class Regression:
         gram, scores = A.T @ A, np.zeros((n, A.shape[1]))
         np.add.at(scores, self.rows.block, A * self.left[:, None])
         moved = np.array([
-            _of_normal(gram - A[own].T @ A[own], scores[b])
+            _of_normal(gram - A[own].T @ A[own], scores[b], LEAST)
             for b, own in enumerate(self.rows.block == b for b in range(n))
         ])  # fmt: skip
         moved = (moved - moved.mean(axis=0)) / size
@@ -151,8 +152,8 @@ def _solved(design: Array, y: Array) -> Array:
     return _of_normal(A.T @ A, A.T @ y) / size
 
 
-def _of_normal(gram: Array, right: Array) -> Array:
-    return np.asarray(np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ right)
+def _of_normal(gram: Array, right: Array, least: float = 1e-12) -> Array:
+    return np.asarray(np.linalg.pinv(gram, rcond=least, hermitian=True) @ right)
 
 
 def _held_out(rows: Rows, design: Array) -> Array:

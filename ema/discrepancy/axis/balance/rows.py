@@ -74,7 +74,8 @@ class Rows:
     ----------
     y, drive, alpha : arrays, shape (n_rows,)
         What is to be explained, the drive's torque [N m or N], and the acceleration [rad/s² or m/s²].
-    integrate : sparse array, shape (n_rows, n_samples)
+    integrate, differentiate : sparse arrays, shape (n_rows, n_samples)
+        ∫ φ f dt and -∫ φ' f dt of what is known at the samples.
     block : array of int, shape (n_rows,)
         Which block a row lies in. Rows that lie across two have a `whole` of False: they are fitted, not held out.
     sigma : array, shape (n_rows,)
@@ -88,6 +89,7 @@ class Rows:
     drive: Array
     alpha: Array
     integrate: csr_array
+    differentiate: csr_array
     block: NDArray[np.int_]
     whole: NDArray[np.bool_]
     record: NDArray[np.int_]
@@ -103,7 +105,13 @@ class Rows:
         if law.needs_acting:
             return [self.integrate @ column for column in law.columns(self.motion, acting)]
         if law.key not in self.known:
-            self.known[law.key] = [self.integrate @ column for column in law.columns(self.motion, acting)]
+            parts = (
+                law.weak(self.motion) if law.weak else [(column, None) for column in law.columns(self.motion, acting)]
+            )
+            self.known[law.key] = [
+                self.integrate @ column + (0.0 if momentum is None else self.differentiate @ momentum)
+                for column, momentum in parts
+            ]
         return self.known[law.key]
 
     @property
@@ -112,8 +120,13 @@ class Rows:
         return int(self.block.max()) + 1 if len(self.block) else 0
 
 
-def rows(plant: AxisPlant, courses: list[Course], halves: dict[str, float] | None = None) -> Rows | None:
-    """Rows of all courses; None where there are too few to say anything. `halves`: half widths by record. [s]"""
+def rows(
+    plant: AxisPlant, courses: list[Course], halves: dict[str, float] | None = None, unsure: float = 0.0
+) -> Rows | None:
+    """Rows of all courses; None where there are too few to say anything. `halves`: half widths by record. [s]
+
+    `unsure`: share of a row in which the axis may rest; where 0, it also turns round in none.
+    """
     widths = halves or half_widths(courses)
     total = sum(float(np.ptp(c.t)) for c in courses if not c.static) or 1.0
     length = max(total / N_BLOCKS, 4.0 * max(widths.values(), default=0.0))
@@ -123,18 +136,19 @@ def rows(plant: AxisPlant, courses: list[Course], halves: dict[str, float] | Non
     thin = max(1.0, sum(n_rows.values()) / MAX_ROWS)
     names = list(dict.fromkeys(c.record for c in courses))
     model = plant.model({})
-    motions, pieces, matrices, offset, block = [], [], [], 0, 0
+    motions, pieces, matrices, derivatives, offset, block = [], [], [], [], 0, 0
     for c in courses:
         motion = _at_rest(plant, model, c) if c.static else _motion(plant, model, c, widths[c.record])
         motions.append(motion)
         n = len(c.t)
         if c.static:
             matrix = _means(n, max(1, round(thin)))
+            slopes = csr_array(matrix.shape)
             centres = np.arange(matrix.shape[0])
             alpha, own, whole = np.zeros(len(centres)), np.full(len(centres), block), np.ones(len(centres), bool)
             sigma = np.full(len(centres), c.noise["drive"] * _per_drive(plant, c) / max(1, round(thin)) ** 0.5)
         else:
-            matrix, alpha, centres, sigma = _weak(plant, c, motion, widths[c.record], thin)
+            matrix, slopes, alpha, centres, sigma = _weak(plant, c, motion, widths[c.record], thin, unsure)
             place = (c.t[centres] - c.t[0]) / length
             own = block + place.astype(int)
             near = np.abs(place - np.round(place)) * length
@@ -143,6 +157,7 @@ def rows(plant: AxisPlant, courses: list[Course], halves: dict[str, float] | Non
             block = int(own.max()) + 1
         pieces.append((alpha, own, whole, np.full(len(centres), names.index(c.record)), sigma))
         matrices.append((matrix, offset, n))
+        derivatives.append((slopes, offset, n))
         offset += n
     alpha, own, whole, record, sigma = (np.concatenate(column) for column in zip(*pieces, strict=True))
     if len(alpha) < FEWEST:
@@ -152,7 +167,8 @@ def rows(plant: AxisPlant, courses: list[Course], halves: dict[str, float] | Non
     motion = replace(_joined(motions), record=of_record, records=tuple(names))
     _, own = np.unique(own, return_inverse=True)
     half = float(np.median(list(widths.values()))) if widths else 0.0
-    return Rows(motion, join @ motion.known, join @ motion.drive, alpha, join, own, whole, record, sigma, half)
+    known, drive, slopes = join @ motion.known, join @ motion.drive, _stacked(derivatives, offset)
+    return Rows(motion, known, drive, alpha, join, slopes, own, whole, record, sigma, half)
 
 
 def half_widths(courses: list[Course], inertia: float = 0.0, drive: float = 0.0) -> dict[str, float]:
@@ -198,8 +214,8 @@ def _alpha(c: Course, index: NDArray[np.int_], first: Array, second: Array) -> t
 
 
 def _weak(
-    plant: AxisPlant, c: Course, m: Motion, half: float, thin: float
-) -> tuple[csr_array, Array, NDArray[np.int_], Array]:
+    plant: AxisPlant, c: Course, m: Motion, half: float, thin: float, unsure: float
+) -> tuple[csr_array, csr_array, Array, NDArray[np.int_], Array]:
     step = max(1, round(0.5 * thin * half / c.period))
     centres = np.arange(0, len(c.t), step)
     index, phi, first, second, whole = bumps_at(c.t, centres, half)
@@ -207,15 +223,17 @@ def _weak(
     used = phi > 0.0
     direction = m.direction[index]
     one_way = (np.where(used, direction, 1.0) > 0.0).all(axis=1) | (np.where(used, direction, -1.0) < 0.0).all(axis=1)
-    good = whole & one_way
-    index, phi, centres = index[good], phi[good], centres[good]
+    rests = (phi * (direction == 0.0)).sum(axis=1)
+    good = whole & (one_way | (rests < unsure))
+    index, phi, first, centres = index[good], phi[good], first[good], centres[good]
     shape = (len(centres), len(c.t))
     columns = (np.repeat(np.arange(len(centres)), index.shape[1]), index.ravel())
     sigma = np.hypot(
         plant.plant.inertia * noise[good],
         _per_drive(plant, c) * c.noise.get("drive", 0.0) * np.sqrt((phi**2).sum(axis=1)),
     )
-    return csr_array((phi.ravel(), columns), shape=shape), alpha[good], centres, sigma
+    weights = (csr_array((x.ravel(), columns), shape=shape) for x in (phi, first))
+    return (*weights, alpha[good], centres, sigma)
 
 
 def _per_drive(plant: AxisPlant, c: Course) -> float:
@@ -232,12 +250,10 @@ def _motion(plant: AxisPlant, model: axis.Model, c: Course, half: float) -> Moti
     if c.position is not None:
         theta, w, a = local_polynomial(c.t, c.position, n_half, 3)[:3]
         noise = c.noise.get("position", 0.0) / (n_half**1.5 * c.period)
-    if c.speed is not None:
-        w_own, a_own = local_polynomial(c.t, c.speed, n_half, 2)[:2]
-        own_noise = c.noise.get("speed", 0.0) / n_half**0.5
-        if c.position is None:
-            w, a, noise = w_own, a_own, own_noise
-            theta = np.concatenate(([0.0], np.cumsum(np.diff(c.t) * 0.5 * (w[1:] + w[:-1]))))
+    elif c.speed is not None:
+        w, a = local_polynomial(c.t, c.speed, n_half, 2)[:2]
+        noise = c.noise.get("speed", 0.0) / n_half**0.5
+        theta = np.concatenate(([0.0], np.cumsum(np.diff(c.t) * 0.5 * (w[1:] + w[:-1]))))
     theta = theta + _zero(plant, c)
     rest = max(SEEN * noise, CREEP * float(np.sqrt(np.mean(w**2))))
     direction = np.where(np.abs(w) > rest, np.sign(w), 0.0)

@@ -10,6 +10,7 @@ from ema.core.records import Array
 from ema.discrepancy.axis.linear import in_metres
 
 from .choice import Balance, Term
+from .law import Law
 from .telling_records import by_record
 
 INTERVAL = (2.5, 97.5)  # percent
@@ -43,6 +44,7 @@ def told(b: Balance, *, linear: bool) -> dict[str, Any]:
         "rows": len(b.model.rows.y),
         "test_function": _short(2.0 * b.model.rows.half),
         "base": {name: _base(b, k, name, samples, linear) for k, name in enumerate(b.model.base)},
+        **({"given": [_law(b, law, samples) for law in b.given]} if b.given else {}),
         "terms": [_term(b, term, samples) for term in b.terms],
         **({"by_record": by_record(b.agreements, b.model.rows.motion.records, linear=linear)} if b.agreements else {}),
     }
@@ -75,24 +77,27 @@ def _base(b: Balance, k: int, name: str, samples: Array, linear: bool) -> dict[s
     return out
 
 
-def _term(b: Balance, term: Term, samples: Array) -> dict[str, Any]:
-    part = b.model.part(term.law)
-    values = term.law.values(b.corrected.coefficients[part])
-    spreads = [term.law.values(c) for c in samples[:, part]]
+def _law(b: Balance, law: Law, samples: Array) -> dict[str, Any]:
+    """A law with its parameters."""
+    part = b.model.part(law)
+    values = law.values(b.corrected.coefficients[part])
+    spreads = [law.values(c) for c in samples[:, part]]
     parameters = {}
-    for name, unit in term.law.parameters.items():
+    for name, unit in law.parameters.items():
         spread = np.array([s[name] for s in spreads])
-        if name == "phase":
+        if name.startswith("phase"):
             spread = values[name] + np.angle(np.exp(1j * (spread - values[name])))
         low, high = np.percentile(spread, INTERVAL)
         parameters[name] = {"value": _short(values[name]), "low": _short(low), "high": _short(high), "unit": unit}
-    others = sorted({*term.alike, *term.law.also})
+    return {"name": law.name, "parameters": parameters, "sentence": law.sentence.format(**values)}
+
+
+def _term(b: Balance, term: Term, samples: Array) -> dict[str, Any]:
+    values = term.law.values(b.corrected.coefficients[b.model.part(term.law)])
     out = {
-        "name": term.law.name,
+        **_law(b, term.law, samples),
         "confidence": round(b.confidence(term), 4),
-        "indistinguishable_from": others,
-        "parameters": parameters,
-        "sentence": term.law.sentence.format(**values),
+        "indistinguishable_from": sorted({*term.alike, *term.law.also}),
         "separated_by": term.law.separated_by,
         "share": _short(term.power / b.drive),
     }
@@ -106,6 +111,7 @@ def sentences(balance: dict[str, Any]) -> list[str]:
     what = "force" if balance["unit"] == "N" else "torque"
     share = balance["explained"]
     base = ", ".join(_number(NAMES[name], q) for name, q in balance["base"].items())
+    base += "".join(f", and {law['sentence']}," for law in balance.get("given", ()))
     out = [f"Balance of {what} along the measured motion: {base} explain {share['fitted']:.1%} of the drive's {what}"]
     if balance["terms"]:
         found = "; ".join(_said(term) for term in balance["terms"])
