@@ -16,6 +16,8 @@ from .balance.telling import sentences, told
 from .closed_loop import closed_loop
 from .dropped import dropped
 from .plant import AxisPlant
+from .plausible import implausible
+from .plausible import told as electrical
 
 MOVED = 0.02  # of the plant file's friction: less is not worth a word
 
@@ -46,6 +48,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     verdict = shared.graded(outcome.verdict, gain)
     found, added = together(plant, [_effect(e) for e in outcome.effects], verdict)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
+    notes += [f"implausible: {text}" for text in implausible(plant, outcome)]
     notes += _moved(plant, outcome) + _kinds(plant) + _zeros(plant, outcome)
     return shared.Findings(
         verdict,
@@ -68,6 +71,8 @@ def _balance(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
     if found is None:
         return {}
     out = told(found, linear=linear)
+    if seen := electrical(plant):
+        out["electrical"] = seen
     if not all(effects(found, term) for term in found.terms):
         return out  # a law that the axis model does not simulate: free runs say nothing of it
     run = plant.errors(point(found, linear=linear), range(len(plant.blocks)))
