@@ -86,17 +86,18 @@ def _quantity(title: str, apart: str | None) -> tuple[str | None, str | None]:
     words = _plain(title).split()
     for what, known in _WORDS.items():
         if set(words) & set(known.split()):
-            if (ending := _ending(title)) is None:
+            if (ending := _ending(title, what)) is None:
                 return what, None
             # a position may be of an angle or of a length, and so its speed: its unit says
             return next(((w, ending) for w, target in _UNITS.items() if _converts(ending, target)), (what, None))
     return ("current", None) if _PHASES.search(_plain(title)) else (None, None)
 
 
-def _ending(title: str) -> str | None:
+def _ending(title: str, what: str) -> str | None:
     """The unit in the last part of a title such as ``pos_deg`` or ``torque Nm``, None where it is none."""
     parts = re.split(r"[_ ]+", titled(title)[0].strip())
-    known = len(parts) > 1 and len(parts[-1]) > 1 and any(_converts(parts[-1], unit) for unit in _UNITS.values())
+    long = len(parts[-1]) > 1 or what == "time"  # a single letter is a phase more often than a unit
+    known = len(parts) > 1 and long and any(_converts(parts[-1], unit) for unit in _UNITS.values())
     return parts[-1] if known else None
 
 
