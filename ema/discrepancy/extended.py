@@ -29,6 +29,9 @@ def write_extended(
     written: set[str] = set()
     several = data.get("kind") == "axis"
     for effect in effects:
+        if not effect.in_every_record:
+            comments.append(f"# not in this model, since not in every record: {effect.sentence}")
+            continue
         key, number = effect.name, 1
         while several and (key in written or (effect.name in LINES and key in declared)):
             number += 1

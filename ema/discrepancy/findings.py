@@ -30,7 +30,8 @@ class Quantity:
 class FoundEffect:
     """A cause with what the data cannot tell from it, and the experiment that could.
 
-    `place` says where it acts: in the plant, in the control loop, or in the recorder alone.
+    `place` says where it acts: in the plant, in the control loop, or in the recorder alone. What is not
+    `in_every_record` is no part of the extended model.
     """
 
     name: str
@@ -40,6 +41,7 @@ class FoundEffect:
     sentence: str
     separated_by: str
     place: Literal["plant", "loop", "recorder"] = "plant"
+    in_every_record: bool = True
 
     @property
     def of_set(self) -> float:

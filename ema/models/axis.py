@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ema.effects import registry
+from ema.effects import friction_memory, registry
 from ema.effects.torque_term import COLUMNS, NEUTRAL
 
 from . import axis_kernel as kernel
@@ -166,6 +166,12 @@ def bristles_after(
     out = np.empty(len(follows))
     kernel.bristles_after(numbers.z, offsets, t, theta, follows, play, out)
     return out
+
+
+def built_up(numbers: Model, share: float, way: float) -> float:
+    """Share of friction that is built up after a further way; all of it without a memory. [rad or m]"""
+    deflection = float(numbers.z[row("friction_memory.deflection")])
+    return float(friction_memory.built_up(share, way, deflection)) if deflection > 0.0 else float(np.sign(way))
 
 
 def true_state(numbers: Model, measured: Array, *, derived: bool) -> Array:

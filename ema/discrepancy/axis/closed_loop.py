@@ -61,7 +61,7 @@ def _run(
     w_ref = cycle["w_ref"][:MOST] if "w_ref" in cycle else np.gradient(ref, t)
     supply = cycle["u_dc"] if "u_dc" in cycle else np.full(len(t), plant.plant.V_dc or 1.0)
     theta, given = np.empty(len(t)), np.empty(len(t))
-    state = np.zeros((1, 4))
+    state, bristle = np.zeros((1, 4)), 0.0
     state[0, 0] = cycle[position][0]
     offsets, step = np.array([0, 2], np.int64), float(np.median(np.diff(t))) / FINE
     for k in range(len(t)):
@@ -70,6 +70,8 @@ def _run(
         given[k] = float(y) * (supply[k] if loop.gives == "duty" else 1.0)
         if k < len(t) - 1:
             drive = np.array([given[k], given[k]])
-            out = axis.simulate(model, kind, offsets, t[k : k + 2], drive, state, step, between="held")
+            window = (offsets, t[k : k + 2], drive, state, step)
+            out = axis.simulate(model, kind, *window, between="held", bristles=np.array([bristle]))
+            bristle = axis.built_up(model, bristle, out[0, 1] - state[0, 0])
             state[0, :2] = out[0, 1], out[1, 1]
     return theta, given

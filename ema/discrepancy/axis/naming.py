@@ -4,7 +4,7 @@
 ``F_d``, ``J``, ``k_t`` …   a parameter of the plant file
 ``stribeck.speed``          a parameter of a library effect
 ``cogging:72.cos``          cosine (sine) part of the cogging line of 72 periods per turn
-``gear_error:14.17.cos``    the same of a gear's line
+``gear_error:14.17.cos``    the same of a gear's line, or of an external torque
 ``term1.coefficient``       a column of an unnamed term (`ema.effects.torque_term`)
 ``zero:NAME``               angle to be added to the positions of record NAME
 ==========================  ===============================================================

@@ -15,6 +15,7 @@ from .balance.as_effects import effects, point
 from .balance.telling import sentences, told
 from .closed_loop import closed_loop
 from .dropped import dropped
+from .external import with_external
 from .plant import AxisPlant
 from .plausible import implausible
 from .plausible import told as electrical
@@ -47,6 +48,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     said = _balance(plant, outcome)
     verdict = shared.graded(outcome.verdict, gain)
     found, added = together(plant, [_effect(e) for e in outcome.effects], verdict)
+    found = with_external(plant, found)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
     notes += [f"implausible: {text}" for text in implausible(plant, outcome)]
     notes += _moved(plant, outcome) + _kinds(plant) + _zeros(plant, outcome)
