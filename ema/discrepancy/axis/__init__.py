@@ -10,6 +10,7 @@
 `candidates`    library effects scaled to this axis, with starts
 `cogging`       the order scan
 `gear`          the scan for a resonance of a gear that gives
+`stamps`        time stamps that vary: whether samples do
 `external`      a torque from outside the motor beside its own cogging
 `zeros`         angle zeros of records given together
 `stretch`       the search for a stretch of other friction

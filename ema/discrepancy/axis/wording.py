@@ -10,6 +10,7 @@ from ema.discrepancy.outcome import Outcome
 from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
+from . import stamps
 from .agreeing import together
 from .balance.as_effects import effects, point
 from .balance.telling import sentences, told
@@ -120,7 +121,7 @@ def _effect(e: dict[str, Any]) -> shared.FoundEffect:
 def _kinds(plant: AxisPlant) -> list[str]:
     """What was taken for granted about each record."""
     out = []
-    for b in plant.benches:
+    for b, record in zip(plant.benches, plant.records, strict=True):
         noise = ", ".join(
             f"{name} {n.sigma:.2g}"
             + (f" and {n.jitter:.2g} s of sampling time" if n.jitter > 1e-6 and not b.static else "")
@@ -130,6 +131,9 @@ def _kinds(plant: AxisPlant) -> list[str]:
         more = f"; {b.roles.derived} repeats {b.roles.position} and is not compared" if b.roles.derived else ""
         how = "at standstill" if b.static else f"driven by {b.roles.drive} in windows of {b.windows[0].n} samples"
         out.append(f"{b.name}: {how}" + (f"; noise estimated: {noise}" if noise else "") + more)
+        channel = b.roles.position or b.roles.speed
+        if channel and not b.static:
+            out += stamps.said(b.name, record.cycles, channel)
     return out
 
 

@@ -1,0 +1,40 @@
+"""Time stamps that vary: by the motion, samples were taken then, or evenly, or nothing can be said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema.core.records import Cycle
+from ema.discrepancy.axis.stamps import said, stamps
+
+PERIOD, N = 1e-3, 4000
+
+
+def cycle(seed, *, sampled=0.0, stamped=0.0, noise=1e-5):
+    """An angle that swings; samples `sampled` off even times, stamps `stamped` off the samples. [s]"""
+    rng = np.random.default_rng(seed)
+    even = np.arange(N) * PERIOD
+    at = even + sampled * rng.standard_normal(N)
+    angle = 3.0 * np.sin(2.0 * np.pi * 1.3 * at) + noise * rng.standard_normal(N)
+    return Cycle(0, {"t": at + stamped * rng.standard_normal(N), "theta_m": angle})
+
+
+@pytest.mark.parametrize(
+    ("how", "samples"), [({"stamped": 5e-5}, "even"), ({"sampled": 5e-5}, "as stamped"), ({}, "either")]
+)
+def test_the_motion_tells_whether_samples_or_stamps_vary(how, samples):
+    for seed in range(8):
+        assert stamps(cycle(seed, **how), "theta_m").samples == samples
+
+
+def test_their_jitter_is_measured_and_said():
+    (sentence,) = said("bench", (cycle(1, stamped=5e-5),), "theta_m")
+    assert stamps(cycle(1, stamped=5e-5), "theta_m").jitter == pytest.approx(5e-5, rel=0.05)
+    assert "bench: time stamps jitter by 5e-05 s rms" in sentence
+    assert said("bench", (cycle(1),), "theta_m") == []
+
+
+def test_an_angle_whose_noise_hides_it_says_nothing():
+    wrong = [stamps(cycle(seed, stamped=5e-5, noise=0.01), "theta_m").samples == "as stamped" for seed in range(40)]
+    assert sum(wrong) <= 1
