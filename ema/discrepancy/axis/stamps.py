@@ -35,7 +35,8 @@ def stamps(cycle: Cycle, channel: str) -> Stamps:
     period = float(np.median(step))
     if len(t) < 4 * HALF * BLOCKS or float(step.max()) > GAP * period or float(np.std(step)) < VARIES * period:
         return Stamps(float(np.std(step)) if len(step) else 0.0, "either")
-    even = np.polyval(np.polyfit(np.arange(len(t)), t, 1), np.arange(len(t)))
+    n = np.arange(len(t))
+    even = np.asarray(np.polyval(np.polyfit(n, t, 1), n), np.float64)
     jitter = float(np.std(t - even))
     more = np.log(_roughness(t, x) / _roughness(even, x))
     spread = float(np.std(more)) / np.sqrt(BLOCKS)
