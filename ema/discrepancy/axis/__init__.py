@@ -19,6 +19,7 @@
 `linear`        metres and newtons in what is said
 `between`       what the drive does between samples
 `structure`     terms suggested by the torque residual when no effect explains it
+`next_records`  what a balance could not tell, and the records that would
 `plausible`     nominal values that no machine has, and what would make them
 `plant`         all of it as the engine's `Plant`
 ==============  =====================================================================================

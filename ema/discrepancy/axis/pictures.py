@@ -11,6 +11,7 @@ from ema.discrepancy.plant import Point
 from ema.discrepancy.report import Picture, picture
 from ema.models.axis_config import LinearAxis
 
+from .balance_pictures import balance_pictures
 from .cogging import integer_orders, thinned
 from .plant import AxisPlant
 from .weak_form import weak_form
@@ -23,7 +24,10 @@ def pictures(plant: AxisPlant, outcome: Outcome) -> list[Picture]:
     """Pictures record by record, and over all records the torque the model lacks."""
     before: Point = dict(zip(outcome.base, outcome.k_before, strict=True))
     out = [_run(plant, name, before, outcome.point) for name in (b.name for b in plant.benches)]
-    return [*out, _torque(plant, before, outcome.point)]
+    out.append(_torque(plant, before, outcome.point))
+    if plant.balance is not None:
+        out += balance_pictures(plant.balance, linear=isinstance(plant.plant, LinearAxis))
+    return out
 
 
 def _run(plant: AxisPlant, name: str, before: Point, after: Point) -> Picture:

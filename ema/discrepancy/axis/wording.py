@@ -17,6 +17,7 @@ from .balance.telling import sentences, told
 from .closed_loop import closed_loop
 from .dropped import dropped
 from .external import with_external
+from .next_records import next_records
 from .plant import AxisPlant
 from .plausible import implausible
 from .plausible import told as electrical
@@ -74,6 +75,8 @@ def _balance(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
     if found is None:
         return {}
     out = told(found, linear=linear)
+    if asked := next_records(out):
+        out["next"] = asked
     if seen := electrical(plant):
         out["electrical"] = seen
     if not all(effects(found, term) for term in found.terms):
