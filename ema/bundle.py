@@ -163,6 +163,7 @@ class Bundle:
             start_k=a["noise_start_k"],
             B=a["start_B"],
             start_scale=a["start_scale"],
+            start_sd=np.array([self.plant.sensors.lvdt_sd, 0.0]),
         )
 
 

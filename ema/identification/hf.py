@@ -41,7 +41,7 @@ class Options(NamedTuple):
     tolerance: float = 0.3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Left(NoiseModel):
     """Noise when the model's error is known but for what a correction leaves, on average where the truth may be."""
 
@@ -59,6 +59,7 @@ class HfInLoop:
 
     def __init__(self, model: Model, first: GaussNewton, options: Options = Options()):  # noqa: B008 - immutable
         self.model, self.first, self.options = model, first, options
+        self.noise = replace(first.noise, start_sd=np.zeros(2))  # runs begin where the cycle may have: it is in theirs
         self.switching = first.noise.switching  # of one run, at any faults
 
     def estimate(self, measurement: Measurement) -> Estimate:
@@ -99,14 +100,14 @@ class HfInLoop:
 
     def _error_before(self, at: np.ndarray, measurement: Measurement) -> np.ndarray:
         """Covariance of the smooth model's error near `at` before any run, shape (n_omega, n_omega). [A²]"""
-        return self.first.noise.covariance(measurement.start, at) - self.first.noise.switching
+        return self.noise.covariance(measurement.start, at) - self.noise.switching
 
     def _corrected(
         self, correction: Correction, switching: np.ndarray, at: np.ndarray, elsewhere: np.ndarray,
         measurement: Measurement,
     ) -> GaussNewton:  # fmt: skip
         """Gauss–Newton on the smooth model and its correction; `switching`: covariance of one run here."""
-        noise, smooth = self.first.noise, self.first.model
+        noise, smooth = self.noise, self.first.model
         own = {field.name: getattr(noise, field.name) for field in fields(NoiseModel)} | {"switching": switching}
         if measurement.start is not None:
             own["start"] = own["start_k"] = np.zeros_like(noise.start)  # HF knows what the start state does
@@ -124,9 +125,12 @@ def make(bundle: Bundle, options: Options = Options()) -> HfInLoop:  # noqa: B00
     plant, schedule, nuisance = bundle.plant, bundle.schedule, bundle.nuisance
 
     def model(x: np.ndarray, start: np.ndarray | None) -> np.ndarray:
-        theta_u, theta_g = np.hsplit(np.zeros(2) if start is None else start, 2)
-        state = hf.start_at(plant, theta_u, theta_g * plant.transmission.GR)
         seeds = SEED + np.arange(len(x)) + int(1e6 * np.abs(x).sum())
+        theta_u, theta_g = np.zeros((2, len(x)))
+        if start is not None:
+            theta_u = plant.sensors.positions(float(start[0]), len(x), np.random.default_rng(seeds[0]))
+            theta_g += start[1]
+        state = hf.start_at(plant, theta_u, theta_g * plant.transmission.GR)
         runs = hf.simulate(plant, x[:, :N_FAULTS], seeds=seeds, start=state, effects=nuisance.effects(x, plant.effects))
         return runs.envelope[:, schedule]
 

@@ -1,17 +1,18 @@
 """How much a measured envelope may differ from a model's: by switching, by the model's own error, by the start state.
 
-    Σ(k, start) = Σ_switch + M(k) + d² (Σ_start + ‖k‖² Σ_start,k)
+    Σ(k, start) = Σ_switch + M(k) + d² (Σ_start + ‖k‖² Σ_start,k) + g gᵀ
 
 Σ_switch: two runs of the same actuator differ by what decides its comparators. M: covariance of the model's error,
 measured by the builder on held-out faults of some sizes ‖k‖, apart for faults that grow alone or in twos and threes and
 for all at once, since models err differently there. Between sizes its trace follows a power of ‖k‖. Σ_start, Σ_start,k:
 what is left of the start state's influence when its regressed part is taken off; it grows with the distance d of the
 start from the middle of the gap at zero, and with the faults: in a worn gear the user lies farther from the motor.
+g: what the start's influence changes by if the start is off by the standard deviation of its measurement.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -43,6 +44,8 @@ class NoiseModel:
         Influence of the start state, regressed on `start_features`. [A]
     start_scale : array, shape (2,)
         Start offsets for which d is 1. [rad]
+    start_sd : array, shape (2,)
+        Standard deviation of a measured start. [rad]
     """
 
     switching: np.ndarray
@@ -53,6 +56,7 @@ class NoiseModel:
     start_k: np.ndarray
     B: np.ndarray
     start_scale: np.ndarray
+    start_sd: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
     def start_shift(self, start: np.ndarray | None, k: np.ndarray) -> np.ndarray:
         """Influence of the start state on the envelope with faults `k` (..., 6), shape (..., n_omega). [A]"""
@@ -63,7 +67,16 @@ class NoiseModel:
     def covariance(self, start: np.ndarray | None, k: np.ndarray) -> np.ndarray:
         """Σ for a cycle that began at `start` with faults near `k`."""
         d2 = D2_UNKNOWN if start is None else min(float(np.sum((start / self.start_scale) ** 2)), D2_MAX)
-        return self.switching + self.of_model(k) + d2 * (self.start + float(k @ k) * self.start_k)
+        far_off = d2 * (self.start + float(k @ k) * self.start_k)
+        return self.switching + self.of_model(k) + far_off + self.of_measured_start(start, k)
+
+    def of_measured_start(self, start: np.ndarray | None, k: np.ndarray) -> np.ndarray:
+        """What an inexact start adds, shape (n_omega, n_omega); nothing where it is unknown. [A²]"""
+        if start is None or not self.start_sd.any():
+            return np.zeros_like(self.switching)
+        at, *off = (self.start_shift(start + ds, k[:N_FAULTS]) for ds in (np.zeros(2), *np.diag(self.start_sd)))
+        g = np.array(off) - at
+        return np.asarray(g.T @ g)
 
     def of_model(self, k: np.ndarray) -> np.ndarray:
         """M(k), shape (n_omega, n_omega); beyond the sizes measured as between the last two. [A²]"""

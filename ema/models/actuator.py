@@ -78,6 +78,15 @@ class Sensors(Settings):
     current_noise: float = quantity("A", "rms noise of the measured currents", ge=0, le=10)
 
     @property
+    def lvdt_sd(self) -> float:
+        """Standard deviation of one measured user position. [rad]"""
+        return float(np.sqrt(self.lvdt_step**2 / 12.0 + self.lvdt_noise**2))
+
+    def positions(self, theta_u: float, n: int, rng: np.random.Generator) -> np.ndarray:
+        """`n` positions at which the user may be when `theta_u` is measured, shape (n,). [rad]"""
+        return theta_u + self.lvdt_step * (rng.random(n) - 0.5) + self.lvdt_noise * rng.standard_normal(n)
+
+    @property
     def adc_step(self) -> float:
         """Resolution of the measured currents. [A]"""
         return 2.0 * self.adc_range / 2**self.adc_bits

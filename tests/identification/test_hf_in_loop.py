@@ -10,7 +10,7 @@ from ema.identification.gauss_newton import GaussNewton
 from ema.identification.hf import HfInLoop
 from ema.identification.noise import N_START, NoiseModel
 
-N, N_WAVES, N_CYCLES = 20, 60, 60
+N, N_WAVES, N_CYCLES = 20, 60, 48
 SIGMA = 0.01  # of switching [A]
 RNG = np.random.default_rng(8)
 A = RNG.standard_normal((N, 6))

@@ -33,3 +33,14 @@ def test_without_faults_a_model_does_not_err():
 def test_an_error_never_seen_stays_none():
     none = NoiseModel(np.eye(2), SIZES, np.array([0.2, 0.8]), 0.0 * MODEL_ERROR, *NO_START)
     assert np.allclose(none.covariance(np.zeros(2), np.full(6, 0.3)), np.eye(2))
+
+
+def test_an_inexact_start_widens_by_what_it_moves():
+    B = np.zeros((2, N_START))
+    B[0, 0], B[0, 2], B[1, 1] = 3.0, 10.0, 5.0  # of θ_u, of θ_u k₁, of θ_m/GR
+    rest = (np.eye(2), SIZES, np.array([0.2, 0.8]), 0.0 * MODEL_ERROR, *np.zeros((2, 2, 2)), B, np.full(2, 1e-4))
+    exact, inexact = NoiseModel(*rest), NoiseModel(*rest, start_sd=np.array([1e-5, 0.0]))
+    k = np.array([0.2, 0, 0, 0, 0, 0])
+    added = inexact.covariance(np.zeros(2), k) - exact.covariance(np.zeros(2), k)
+    assert added == pytest.approx(np.diag([(0.1 * (3.0 + 0.2 * 10.0)) ** 2, 0.0]), rel=0.1)
+    assert inexact.covariance(None, k) == pytest.approx(exact.covariance(None, k))
