@@ -34,7 +34,8 @@ _PARSER = (ValueError, TypeError, AssertionError, AttributeError, ArithmeticErro
 def _registry() -> Any:
     import pint
 
-    registry: Any = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+    # What pint reads otherwise is redefined on purpose: without a warning among the lines that people are shown.
+    registry: Any = pint.UnitRegistry(autoconvert_offset_to_baseunit=True, on_redefinition="ignore")
     for definition in _AS_WRITTEN:
         registry.define(definition)
     return registry

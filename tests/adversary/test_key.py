@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from attacked import K, of, reasons, sealed, statuses
 from ema.bus import codec as codecs
 from ema.bus.interface import BusSettings, open_bus
 from ema.core import frames as fr
-from ema.core.status import Reason, Status
+from ema.core.status import Lapse, Reason, ServiceState, Status
 
 CODEC = codecs.default()
 _NEAR = 0.03  # of k: one noisy cycle by a coarse bundle
@@ -108,3 +109,37 @@ def test_an_actuator_without_the_key(attack, tell, key):
         one for one in daemon.said if one.name.startswith("Estimate") and one.values["status"] <= Status.DEGRADED
     ]
     tell("an actuator that has no key", beat.values["n_refused"], "every frame refused, no usable estimate", "nothing")
+
+
+LOSSES = {"MonitorChallenge": "the monitor's challenges", "ActuatorSession": "the answers to its challenges"}
+
+
+@pytest.mark.parametrize("name", LOSSES)
+def test_a_session_is_not_agreed_upon_at_once(locked, tell, monkeypatch, name):
+    """Of the handshake that a monitor that has just started needs, the first messages are lost."""
+    daemon, inner, gets_through, lost = locked, locked.actuator.port._port, threading.Event(), []
+    read, write = inner.read, inner.write
+
+    def without(frames):
+        theirs = of(frames, name)
+        if gets_through.is_set() or not theirs.any():
+            return frames
+        lost.extend(frames[theirs])
+        return frames[~theirs]
+
+    daemon.process.kill()
+    daemon.process.wait()
+    monkeypatch.setattr(inner, "read", lambda timeout: without(read(timeout)))
+    monkeypatch.setattr(inner, "write", lambda frames: write(without(frames)))
+    n_before = len(daemon.said)
+    daemon.start()
+    daemon.until_state(ServiceState.DEGRADED, Lapse.SILENT)
+    while len(lost) < 3:
+        time.sleep(0.1)
+    assert not [one for one in daemon.said[n_before:] if one.name.startswith("Estimate")]
+    gets_through.set()
+    again = daemon.until(lambda one: one.name == "EstimateLinear" and one.values["status"] == Status.VALID)[1]
+    daemon.until_state(ServiceState.RUNNING)
+    tell(f"{LOSSES[name]} are lost after its start", len(lost),
+         f"asked again every second; meanwhile degraded, `silent`; valid {again:.1f} s after one gets through",
+         "the cycles meanwhile")  # fmt: skip

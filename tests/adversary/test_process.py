@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shutil
 import signal
+import subprocess
 import time
 
 import numpy as np
 import pytest
 from attacked import statuses
 
-from ema.core.status import LogState, ServiceState, Status
+from ema.core.status import Lapse, LogState, ServiceState, Status
 from ema.log import LogReader
 
 FLUSH = 1.0  # interval of the log [s]
@@ -79,6 +80,29 @@ def test_the_log_folder_is_deleted(attack, tell):
     tell("the log's folder is deleted, later made again", 1,
          f"log failed, said after {late:.1f} s; estimates go on; logged again {again:.1f} s later",
          "what the folder held")  # fmt: skip
+
+
+def test_the_log_folder_becomes_read_only(attack, tell):
+    """No kernel remounts read-only what is open for writing: another read-only file system is laid over the folder."""
+    if subprocess.run(["unshare", "--mount", "true"], capture_output=True, check=False).returncode:
+        pytest.skip("mount namespaces are not to be had here: root has them")
+    daemon = attack(within=["unshare", "--mount"])
+    daemon.until_state(ServiceState.RUNNING)
+    there = ["nsenter", "--target", str(daemon.process.pid), "--mount"]
+    subprocess.run([*there, "mount", "-t", "tmpfs", "-o", "ro", "none", daemon.log], check=True)
+    late = daemon.until_state(ServiceState.DEGRADED, Lapse.LOG)
+    assert set(statuses(daemon.estimates(2))) == {Status.VALID}
+    subprocess.run([*there, "umount", "--lazy", daemon.log], check=True)
+    again = daemon.until_state(ServiceState.RUNNING)
+    daemon.estimates(2)
+    assert daemon.stop() == 0
+    with LogReader(daemon.log) as log:
+        assert not log.damage
+        estimates = sum(m.topic == "/estimate/0/linear" for m in log.messages())
+    n_lost = sum(one.name == "EstimateLinear" for one in daemon.said) - estimates
+    tell("the log's folder becomes read-only for 3 s, then writable", 1,
+         f"degraded, `log`, after {late:.1f} s; estimates go on; running {again:.1f} s after it is over; what there is "
+         f"is sound", f"{n_lost} estimates of the log")  # fmt: skip
 
 
 def test_signals_that_end_other_programs(attack, tell):

@@ -9,9 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 import yaml
-from attacked import EMA, group
-
-PATIENCE = 60.0  # [s]
+from attacked import EMA, PATIENCE, group, refusal
 
 
 @pytest.fixture
@@ -66,21 +64,12 @@ ATTACKS = {
 }
 
 
-def refusal(arguments):
-    """What the daemon says."""
-    ran = subprocess.run([EMA, "daemon", *arguments], capture_output=True, text=True, timeout=PATIENCE, check=False)
-    assert ran.returncode == 2, ran.stderr
-    lines = [line for line in ran.stderr.splitlines() if not line.startswith(("Usage:", "Try "))]
-    assert len([line for line in lines if line]) == 1, ran.stderr
-    return lines[-1]
-
-
 @pytest.mark.parametrize("name", ATTACKS)
 def test_a_file_or_key_that_cannot_be_used(tmp_path, files, tell, name):
     ATTACKS[name](tmp_path, files)
     config = tmp_path / "daemon.yaml"
     config.write_text(yaml.safe_dump(files))
-    said = refusal(["--config", config]).replace(str(tmp_path), "…")
+    said = refusal("--config", config).replace(str(tmp_path), "…")
     assert not list((tmp_path / "log").glob("*.mcap"))
     tell(name, 1, f"refused: “{said[:140]}”", "nothing")
 
@@ -96,7 +85,7 @@ def test_a_configuration_that_is_no_file_of_its_kind(tmp_path, tell, kind):
         path.symlink_to(kind)
     else:
         path.write_text("[" * 1_000_000)
-    said = refusal(["--config", path]).replace(str(tmp_path), "…")
+    said = refusal("--config", path).replace(str(tmp_path), "…")
     tell(f"a configuration that is {kind}", 1, f"refused: “{said[:140]}”", "nothing")
 
 
@@ -105,7 +94,7 @@ def test_a_folder_another_daemon_logs_to(attack, tell, tmp_path):
     content = yaml.safe_load(first.config.read_text()) | {"bus": group()}
     second = first.folder / "second.yaml"
     second.write_text(yaml.safe_dump(content))
-    said = refusal(["--config", second]).replace(str(tmp_path), "…")
+    said = refusal("--config", second).replace(str(tmp_path), "…")
     assert first.stop() == 0
     tell("a second daemon on the same log folder", 1, f"refused: “{said[:140]}”", "nothing")
 

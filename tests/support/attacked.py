@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -123,11 +123,12 @@ class ActuatorOnBus(threading.Thread):
 class Attacked:
     """A daemon process in a folder of its own; everything it sends is kept in `said`, in order.
 
-    `before` makes of the bus what the daemon's configuration says of it; `settings` are other sections.
+    `before` makes of the bus what the daemon's configuration says of it; `within` is a command that runs another one;
+    `settings` are other sections.
     """
 
-    def __init__(self, folder: Path, bundle: Any, before: Any = dict, **settings: Any):
-        self.folder, self.log = folder, folder / "log"
+    def __init__(self, folder: Path, bundle: Any, before: Any = dict, within: Sequence[str] = (), **settings: Any):
+        self.folder, self.log, self.within = folder, folder / "log", within
         self.log.mkdir(parents=True, exist_ok=True)
         self.bus = group()
         self.config = folder / "daemon.yaml"
@@ -147,7 +148,7 @@ class Attacked:
     def start(self) -> Attacked:
         """Start the process and wait for its first heartbeat."""
         with self.stderr.open("ab") as said:
-            self.process = subprocess.Popen([EMA, "daemon", "--config", self.config], stderr=said)
+            self.process = subprocess.Popen([*self.within, EMA, "daemon", "--config", self.config], stderr=said)
         self.until(lambda one: one.name == "Heartbeat")
         return self
 
@@ -219,6 +220,15 @@ class Attacked:
                 for row, number in enumerate(identifiers.actuator(own["id"]).tolist()):
                     one = {name: x[row] if x.ndim > 1 else x[row].item() for name, x in values.items()}
                     self.said.append(Said(message.name, number, one, time.monotonic()))
+
+
+def refusal(*arguments: Any) -> str:
+    """What a daemon that does not start says: one line."""
+    ran = subprocess.run([EMA, "daemon", *arguments], capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert ran.returncode == 2, ran.stderr
+    lines = [line for line in ran.stderr.splitlines() if line and not line.startswith(("Usage:", "Try "))]
+    assert len(lines) == 1, ran.stderr
+    return lines[0]
 
 
 def statuses(estimates: list[Said]) -> list[Status]:
