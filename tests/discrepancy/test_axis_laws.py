@@ -7,9 +7,11 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.balance import balance
 from ema.discrepancy.axis.balance.as_effects import point
 from ema.discrepancy.axis.balance.telling import told
+from ema.discrepancy.axis.between import examined
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
@@ -68,6 +70,13 @@ def test_viscous_friction_of_an_activation_energy_is_that_of_reynolds_exponentia
     assert 1.5e-3 - C * (1.0 - np.exp(-38.0 * k)) == pytest.approx(1.5e-3 * lost, rel=0.1)
 
 
+def test_magnets_that_weaken_as_they_warm_up_are_told_from_friction_that_does(geared):
+    (law,) = laws_of(geared, flux_per_kelvin=-0.0012, warms=(22.0, 110.0, 4.0), temperature=True).values()
+    assert law["name"] == "magnet_flux"
+    assert law["confidence"] > 0.9
+    assert law["parameters"]["per_kelvin"]["value"] == pytest.approx(-0.0012, rel=0.1)
+
+
 @pytest.mark.parametrize(
     ("hidden", "name", "change"),
     [
@@ -112,3 +121,17 @@ def test_a_torque_at_an_order_of_the_declared_gear_is_the_gear_s(geared, gear, o
 
 def test_a_line_between_two_motor_orders_is_none_of_the_gear_where_no_gear_is_declared(geared):
     assert "gear_error" not in laws_of(geared, lines=((0.006, 17.0 * 85.0 / 102.0, 0.7),), seconds=6.0)
+
+
+@pytest.mark.slow
+def test_a_torque_channel_that_reads_too_much_is_named_or_in_a_set_where_inertia_is_known(geared):
+    """All of the drive's torque is 15 % too large: inertia, friction and drag would be, too."""
+    axis = geared.Axis(C=6e-4)
+    (cycle,) = geared.record(axis, 1, seconds=4.0)
+    channels = {name: x for name, x in cycle.channels.items() if name != "i_q"}
+    record = Record((Cycle(0, {**channels, "torque": 1.15 * axis.k_t * cycle["i_q"]}),))
+    model = {"kind": "axis", "drive": "torque", "J": axis.J, "F_d": axis.F, "C": axis.C}
+    (found,) = examined(AxisPlant(RotaryAxis.model_validate(model), [record])).effects
+    assert found["name"] == "drive_gain"
+    assert len(found["indistinguishable_from"]) <= 1
+    assert found["parameters"]["gain"]["value"] == pytest.approx(0.15, abs=0.005)

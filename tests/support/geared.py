@@ -30,6 +30,7 @@ class Axis:
     viscous_activation: float = 0.0  # [K] E/R of Arrhenius' law
     dry_rate: float = 0.0  # [1/s]
     viscous_rate: float = 0.0  # [1/s] of C
+    flux_per_kelvin: float = 0.0  # [1/K] of the torque constant
     by_square: float = 0.0  # [1/(N m)] friction over motor torque squared
     lines: tuple[tuple[float, float, float], ...] = ()  # amplitude [N m], order per motor turn, phase
     reads: float = 1.0  # recorded current over the true one
@@ -40,7 +41,7 @@ class Axis:
 
 @njit(cache=False)
 def _run(reference, hz, p, warm, lines, loop, out):
-    J, F, C, k_t, bristle, dry_k, activation, dry_rate, viscous_rate, by_square = p
+    J, F, C, k_t, bristle, dry_k, activation, dry_rate, viscous_rate, by_square, flux = p
     K_p, K_w = loop
     theta, w, z = reference[0], 0.0, 0.0
     dt = 1.0 / (hz * FINE)
@@ -53,7 +54,7 @@ def _run(reference, hz, p, warm, lines, loop, out):
         drag = C * (1.0 + viscous_rate * t) * np.exp(activation * (1.0 / kelvin - 1.0 / 293.15))
         dry = F * (1.0 + dry_rate * t) * np.exp(-dry_k * (warm[k] - 20.0))
         for _ in range(FINE):
-            motor = k_t * i
+            motor = k_t * (1.0 + flux * (warm[k] - 20.0)) * i
             other = drag * w
             for n in range(lines.shape[0]):
                 other += lines[n, 0] * np.sin(lines[n, 1] * theta + lines[n, 2])
@@ -87,7 +88,7 @@ def record(
     out = np.empty((3, n))
     p = (
         *(axis.J, axis.F, axis.C, axis.k_t, axis.bristle, axis.dry_per_kelvin, axis.viscous_activation),
-        *(axis.dry_rate, axis.viscous_rate, axis.by_square),
+        *(axis.dry_rate, axis.viscous_rate, axis.by_square, axis.flux_per_kelvin),
     )
     _run(reference, axis.hz, p, warm, np.array(axis.lines, float).reshape(-1, 3), loop, out)
     theta, w, i = (x + s * rng.standard_normal(n) for x, s in zip(out, axis.noise, strict=True))

@@ -129,6 +129,7 @@ _MAKERS: Mapping[str, _Maker] = {
     "quadratic_output_load_friction": _as_it_is("quadratic_output_load_friction", "per_torque"),
     "quadratic_load_friction": _quadratic_load_friction,
     "friction_memory": _as_it_is("friction_memory", "deflection"),
+    "magnet_flux": _as_it_is("magnet_flux", "per_kelvin"),
     "friction_drift": _friction_drift,
     "viscous_drift": _viscous_drift,
     "friction_by_temperature": _friction_by_temperature,

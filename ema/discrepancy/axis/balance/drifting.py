@@ -1,4 +1,4 @@
-"""Laws of friction that drifts: with time within a cycle, or with the temperature where one was recorded."""
+"""What drifts: friction with time within a cycle; friction and magnets with the temperature where one was recorded."""
 
 from __future__ import annotations
 
@@ -42,6 +42,17 @@ def drifting(m: Motion, torque: str, place: str) -> Iterator[Law]:
         )
     if float(np.ptp(m.dT)) < WARMED:
         return
+    yield Law(
+        "magnets by temperature",
+        "magnets by temperature",
+        "magnet_flux",
+        lambda m, acting: (-acting.motor * m.dT,),
+        {"per_kelvin": "1/K"},
+        one("per_kelvin"),
+        "the torque per current changes by {per_kelvin:+.3%} per kelvin of the recorded temperature",
+        "voltage at a known speed, cold and warm",
+        needs_acting=True,
+    )
     for k in LOST:
         for name, what, unit, columns in (
             ("friction_by_temperature", "dry friction", torque, _dry(k)),
