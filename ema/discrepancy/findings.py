@@ -31,7 +31,8 @@ class FoundEffect:
     """A cause with what the data cannot tell from it, and the experiment that could.
 
     `place` says where it acts: in the plant, in the control loop, or in the recorder alone. What is not
-    `in_every_record` is no part of the extended model.
+    `in_every_record` is no part of the extended model. `of_others` is the probability that it is one of what the data
+    cannot tell from it, where that was weighed.
     """
 
     name: str
@@ -42,10 +43,13 @@ class FoundEffect:
     separated_by: str
     place: Literal["plant", "loop", "recorder"] = "plant"
     in_every_record: bool = True
+    of_others: float | None = None
 
     @property
     def of_set(self) -> float:
         """Confidence that it is this one or one of those that it cannot be told from, which share what is sure."""
+        if self.of_others is not None:
+            return min(1.0, self.confidence + self.of_others)
         return min(1.0, self.confidence * (1 + len(self.indistinguishable_from)))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ema.core.names import FAULTS
-from ema.discrepancy.engine.contest import Contest, Entrant, Outcome
+from ema.discrepancy.engine.contest import EXPANSIONS, Contest, Entrant, Outcome
 from ema.discrepancy.engine.statistic import Whitening
 
 from .features import Array
@@ -17,17 +17,20 @@ from .problem import ActuatorProblem, as_cause
 from .search import Model, Search
 
 RUNS = 1_000  # seeds of a motion's noise, at most
-MOST = 8  # sets of effects that are weighed
+MOST = 6  # sets of effects that are weighed
 RECORDS = 16  # simulated records of each
 WORTH_A_WORD = 0.01  # a fault
 
 
-def weighed(search: Search, before: Model, after: Model) -> Outcome:
-    """Probabilities of the sets of effects that were tried, and the best hypothesis of each."""
+def weighed(search: Search, before: Model, after: Model) -> tuple[Outcome, list[Model]]:
+    """Probabilities of the sets of effects that were tried, and the best model of each, likeliest first."""
     search.say("probabilities of what was tried")
     problem = ActuatorProblem(search.plant)
-    found = entrants(search, before, after)
-    return Contest(problem, found, _whitening(problem, search.noise), RECORDS, search.say).run(found)
+    models = _standing(search, before, after)
+    found = [_entrant(search, m) for m in models]
+    outcome = Contest(problem, found, _whitening(problem, search.noise), RECORDS, search.say).run(found)
+    first = {e.names: m for m, e in reversed([*zip(models, found, strict=True)])}
+    return outcome, [first[entry.causes] for entry in outcome.posterior]
 
 
 def as_told(outcome: Outcome) -> list[dict[str, Any]]:
@@ -48,20 +51,20 @@ def as_told(outcome: Outcome) -> list[dict[str, Any]]:
     ]
 
 
-def entrants(search: Search, before: Model, after: Model) -> list[Entrant]:
-    """Faults alone, the answer, and the best model of every other set of effects, those that leave least first."""
-    best: dict[frozenset[str], Model] = {}
-    for m in (*search.tried, before, after):
-        key = frozenset(m.names)
-        if key not in best or m.heldout < best[key].heldout:
-            best[key] = m
-    best |= {frozenset(m.names): m for m in (before, after)}
-    first = [before, *([after] if after is not before else [])]
-    others = sorted((m for m in best.values() if m not in first), key=lambda m: m.heldout)
-    return [entrant(search, m) for m in (*first, *others[: MOST - len(first)])]
+def _standing(search: Search, before: Model, after: Model) -> list[Model]:
+    """Faults alone, the answer, and the models of other sets of effects, those that leave least first.
+
+    Of each set its best models, however many: where they ended apart, all of them count.
+    """
+    sets: dict[frozenset[str], list[Model]] = {frozenset(m.names): [m] for m in (before, after)}
+    for m in sorted(search.tried, key=lambda m: m.heldout):
+        of = sets.setdefault(frozenset(m.names), []) if len(sets) < MOST else sets.get(frozenset(m.names), [])
+        if len(of) < EXPANSIONS and all(m.fit.point != other.fit.point for other in of):
+            of.append(m)
+    return [m for of in sets.values() for m in of]
 
 
-def entrant(search: Search, model: Model) -> Entrant:
+def _entrant(search: Search, model: Model) -> Entrant:
     """A fitted model with its columns; those of faults that were not free are simulated."""
     plant, point = search.plant, model.fit.point
     frees = {f.name: f for f in (*K_FREE, *model.fit.free)}

@@ -13,7 +13,7 @@ from ema.models.actuator import Actuator
 
 from .conditions import as_recorded
 from .cycles import Measured
-from .entrants import as_told, weighed
+from .entrants import weighed
 from .gear import swinging
 from .growing import beside, growing, said, widened
 from .next_recording import next_recording
@@ -31,12 +31,13 @@ from .simpler import (
     without_doubtful,
     without_superfluous,
 )
-from .telling import odds, told, with_function
+from .telling import probabilities, told, with_function
 from .thinning import thinned
 from .verdicts import at_the_minimum
+from .weighing import is_credible
 
 MIN_CYCLES = 2
-UNLIKELY = 0.1  # odds of an effect, against what is no credible cause too, below which it is not named
+UNLIKELY = 0.1  # probability of an effect with all that the record cannot tell from it, below which it is not named
 N_BESIDE = 2  # turns in which faults of each cycle are found anew beside the effects
 
 
@@ -115,14 +116,19 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
     after, v = with_temperature_only(search, after, v)
     after, v = with_zero(search, after, v, alike)
     sets = [(name, *rivals) for name, rivals in zip(after.names, alike, strict=True)]
-    unlikely = [names[0] for names in sets if sum(odds(search, after, *names)) < UNLIKELY]
-    if unlikely:
+    outcome, models = weighed(search, before, after)
+    unlikely = [names[0] for names in sets if sum(probabilities(outcome, after, *names)) < UNLIKELY]
+    if unlikely and (not models[0].effects or is_credible(models[0])):
+        say(f"{' + '.join(models[0].names) or 'faults only'} instead of {' + '.join(after.names)}")
+        after, alike = models[0], [()] * len(models[0].effects)
+        v = search.verdict(after) if after.effects else path.verdict_before
+    elif unlikely:
         after, v, alike = before, path.verdict_before, []
         conditions.append(f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named")
     alike = [still_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
     if of_each is not None and after.effects:
         after = widened(search, after)
-    findings = replace(told(search, before, after, v, alike), posterior=as_told(weighed(search, before, after)))
+    findings = told(search, before, after, v, alike, outcome)
     findings = replace(findings, next_recording=next_recording(search, after, alike, findings.posterior))
     if findings.verdict == "adequate":
         conditions.extend(path.as_well)

@@ -2,41 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 
 from ema.core.names import FAULTS
+from ema.discrepancy.engine.contest import Outcome
+from ema.discrepancy.engine.posterior import p_cause
 from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity, graded
 from ema.effects import registry
 
 from . import controller, repeating
-from .candidates import Candidate
+from .entrants import as_told
 from .extension import as_extension
 from .fit import SEED, Fit
 from .leave_out import over_folds, square
 from .noise import SEED as NOISE_SEED
 from .noise import Verdict
 from .plant import Point
-from .search import CHANCE, FINAL_SEED, K_SEEN, N_FINAL, Model, Search
+from .search import CHANCE, FINAL_SEED, N_FINAL, Model, Search
 from .structure import structure
 from .weighing import WORTH_IT, is_enough
 
 IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
-FORM = 0.5  # of a value, for a rest as large as the whole effect: the interval holds what would take all of the rest
 NAMED = 0.95  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
-UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: a rest is left that nothing explains, or
-LITTLE = 2.0  # what faults alone leave is no more than this excess, which two effects together nearly always explain
+UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: a rest is left that nothing explains
+IN_LIBRARY = 0.99  # probability that what does it is in the library at all, where it leaves nothing
 LOUD, MOST = 1.3, 0.5  # misfit of a cycle that shows a rest; share of it that is worth a word
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
 SEEDS = {"noise": NOISE_SEED, "fit": SEED, "held out": FINAL_SEED}  # the first of each
 NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none
 
 
-def told(search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]]) -> Findings:
-    """The verdict on `after`, with its effects and their rivals `alike`, structure, gain over `before`, notes."""
+def told(
+    search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]], outcome: Outcome
+) -> Findings:
+    """The verdict on `after`, with its effects and their rivals `alike`, structure, gain over `before`, notes.
+
+    `outcome` holds the probabilities and sizes of all that was weighed.
+    """
     torque_lines = [c for c in after.effects if c.effect in ("cogging", "torque_line")]
     odd = [c for c in torque_lines if not _integer(after.fit, c.effect)]
     further = [c for c in torque_lines if c.effect == "torque_line" and not odd]
@@ -59,10 +64,8 @@ def told(search: Search, before: Model, after: Model, v: Verdict, alike: list[tu
     if not search.plant.data.has_temperature:
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
     kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c.effect != "torque_line" and c not in odd]
-    rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
-    found = [_found(search, after, c.effect, a, rest) for c, a in kept]
-    found = [_whatever_the_cause(search, after, e, kept) for e in found]
-    if verdict == "unexplained" or (len(found) > 1 and before.excess < LITTLE):
+    found = [_found(search, after, c.effect, a, outcome) for c, a in kept]
+    if verdict == "unexplained":
         found = [replace(e, confidence=UNCERTAIN_LAW * e.confidence) for e in found]
     if too_little and found:
         notes.append(
@@ -80,7 +83,7 @@ def told(search: Search, before: Model, after: Model, v: Verdict, alike: list[tu
         {"name": " + ".join(m.names) or "faults only", "score": -m.heldout}
         for m in sorted(search.tried, key=lambda m: m.heldout)
     ]
-    unnamed = [_found(search, after, c.effect, (), rest, "torque_line") for c in (*odd, *further)][:1]
+    unnamed = [_found(search, after, c.effect, (), outcome, "torque_line") for c in (*odd, *further)][:1]
     if further:
         values = {name: q.value for name, q in unnamed[0].parameters.items()}
         unnamed = [replace(unnamed[0], sentence=f"a further {registry()['cogging'].said(values)}")]
@@ -88,7 +91,7 @@ def told(search: Search, before: Model, after: Model, v: Verdict, alike: list[tu
     gain = _gain(search, before, after)
     return Findings(
         graded(verdict, gain), found, gain, shape, tried, notes,
-        unnamed=unnamed, rejected=rejected(search, before, after), seeds=SEEDS,
+        unnamed=unnamed, posterior=as_told(outcome), rejected=rejected(search, before, after), seeds=SEEDS,
     )  # fmt: skip
 
 
@@ -158,70 +161,36 @@ def _integer(fit: Fit, line: str) -> bool:
 
 
 def _found(
-    search: Search, model: Model, effect: str, alike: tuple[str, ...], rest: float, told_as: str = ""
+    search: Search, model: Model, effect: str, alike: tuple[str, ...], outcome: Outcome, told_as: str = ""
 ) -> FoundEffect:
     """What was fitted as `effect`, told as that or as another effect with the same parameters.
 
-    `rest` is the amplitude of what is left above noise over that of what there was to explain. A fault that the effect
-    took the place of was taken for none; it may be as large as what is not seen.
+    With the probability and the sizes that all sets of causes together give it.
     """
     e = registry()[told_as or effect]
-    fit = model.fit
-    bounds = {f.name: f for f in fit.free}
-    c = next(c for c in model.effects if c.effect == effect)
-    gone = [name for name in c.faults if name not in bounds]
-    small = K_SEEN / np.sqrt(12.0) * np.sqrt(len(gone) * len(c.linear)) / max(len(c.faults), 1)
-    values = {p.name: fit.point.get(f"{effect}.{p.name}", p.neutral) for p in e.parameters}
+    bounds = {f.name: f for f in model.fit.free}
+    values = {p.name: model.fit.point.get(f"{effect}.{p.name}", p.neutral) for p in e.parameters}
+    sizes = outcome.sizes(effect)
     parameters = {}
     for p in e.parameters:
         name = f"{effect}.{p.name}"
         if name in bounds:
-            value, least = values[p.name], e.least_sd.get(p.name, 0.0)
-            parts = [fit.sd[name], IMPLEMENTATION * value, FORM * rest * value, least]
-            sd = float(np.linalg.norm([*parts, small if p.unit == "1" and p.name in c.linear else 0.0]))
+            value, own = sizes[name]
+            differing = model.fit.sd[name] if search.plant.data.faults.any() else 0.0  # faults of each cycle
+            sd = float(np.linalg.norm([max(own, differing), IMPLEMENTATION * value, e.least_sd.get(p.name, 0.0)]))
             f = bounds[name]
-            parameters[p.name] = Quantity(
-                values[p.name], max(values[p.name] - 1.96 * sd, f.low), min(values[p.name] + 1.96 * sd, f.high), p.unit
-            )
-    own, *_ = odds(search, model, effect)
-    return FoundEffect(e.name, own, alike, parameters, e.said(values), e.separated_by, e.place)
+            values[p.name] = value
+            parameters[p.name] = Quantity(value, max(value - 1.96 * sd, f.low), min(value + 1.96 * sd, f.high), p.unit)
+    own, *others = (IN_LIBRARY * p for p in probabilities(outcome, model, effect, *alike))
+    return FoundEffect(e.name, own, alike, parameters, e.said(values), e.separated_by, e.place, of_others=sum(others))
 
 
-def _whatever_the_cause(
-    search: Search, model: Model, found: FoundEffect, kept: Sequence[tuple[Candidate, tuple[str, ...]]]
-) -> FoundEffect:
-    """`found` with intervals that hold its parameters beside the rivals of the other effects too."""
-    parameters = dict(found.parameters)
-    for other, rivals in kept:
-        for rival in rivals if other.effect != found.name else ():
-            names = {rival if name == other.effect else name for name in model.names}
-            beside = [m for m in search.tried if len(m.names) == len(model.names) and set(m.names) == names]
-            if not beside:  # faults, or the zero of a sensor
-                continue
-            fit = min(beside, key=lambda m: m.heldout).fit
-            for name, q in parameters.items():
-                p = f"{found.name}.{name}"
-                x, reach = fit.point.get(p, q.value), 1.96 * fit.sd.get(p, 0.0)
-                parameters[name] = replace(q, low=min(q.low, x - reach), high=max(q.high, x + reach))
-    return replace(found, parameters=parameters)
-
-
-def odds(search: Search, model: Model, effect: str, *rivals: str) -> list[float]:
-    """Odds of an effect of `model`, and of its rivals, against all that was tried in its place, by held-out misfit.
-
-    Differences that seeds make do not count; a library is never complete.
-    """
-    place = model.names.index(effect)
-    n = sum(len(search.plant.data.y[c]) for c in search.heldout)
-    best: dict[str, float] = {}
-    for m in search.tried:
-        if len(m.names) > place and m.names[:place] == model.names[:place] and len(m.names) == place + 1:
-            best[m.names[place]] = min(m.heldout, best.get(m.names[place], np.inf))
-    own = best.get(effect, model.heldout)
-    least = min([own, *best.values()])
-    more = {name: max(x - least - CHANCE, 0.0) for name, x in {**best, effect: own}.items()}
-    by_misfit = {name: np.exp(-0.5 * n * x / max(least, 1.0)) for name, x in more.items()}
-    return [float(0.99 * by_misfit.get(name, 0.0) / sum(by_misfit.values())) for name in (effect, *rivals)]
+def probabilities(outcome: Outcome, model: Model, effect: str, *rivals: str) -> list[float]:
+    """Probability that an effect of `model` is there, and of each rival in its place: another effect, or faults."""
+    rest = set(model.names) - {effect}
+    sets = [rest | ({rival} & set(registry())) for rival in rivals]
+    instead = [sum(e.probability for e in outcome.posterior if set(e.causes) == names) for names in sets]
+    return [p_cause(outcome.posterior, effect), *instead]
 
 
 def _envelope_error(search: Search, point: Point, cycles: list[int]) -> float:

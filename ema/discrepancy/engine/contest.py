@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import chi2
 
 from .evidence import Evidence, evidence
 from .hypothesis import Array, Cause, Parameter, Point, Problem
@@ -20,7 +22,9 @@ from .statistic import Prediction, Statistic, Whitening
 
 Say = Callable[[str], None]
 BEHIND = 30.0  # [nats] behind the leader, from which a set is not looked at more closely
-TURNS = 2  # in which those near the leader are simulated anew where their evidence says
+TURNS = 2  # in which one is simulated anew where its evidence says it is
+OUTSIDE = 0.01  # probability of a step that noise makes, from which it is simulated there
+EXPANSIONS = 3  # points by which a set near the leader is weighed
 
 
 @dataclass(frozen=True)
@@ -46,10 +50,18 @@ class Entrant:
         """Names of the causes."""
         return tuple(c.name for c in self.causes)
 
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of their parameters."""
+        return tuple(p.name for c in self.causes for p in c.parameters)
+
 
 @dataclass(frozen=True)
 class Weighed:
-    """An entrant with its evidence, prior included, and that one's own error. [nats]"""
+    """An entrant with its evidence, prior included, and that one's own error. [nats]
+
+    `felt` is the squared step from where it was simulated to where its evidence says it is, in deviations of a record.
+    """
 
     entrant: Entrant
     parameters: tuple[Parameter, ...]
@@ -57,11 +69,22 @@ class Weighed:
     evidence: Evidence
     log_evidence: float
     error: float
+    felt: float
+
+    @property
+    def name(self) -> str:
+        """The causes in words."""
+        return " + ".join(self.entrant.names) or "faults only"
 
     @property
     def point(self) -> dict[str, float]:
         """Expected values of faults and parameters."""
         return {p.name: p.neutral + float(u) for p, u in zip(self.parameters, self.evidence.mean, strict=True)}
+
+    @property
+    def sd(self) -> dict[str, float]:
+        """Their standard deviations."""
+        return {p.name: float(s) for p, s in zip(self.parameters, self.evidence.sd, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -70,6 +93,27 @@ class Outcome:
 
     posterior: list[Entry]
     weighed: list[Weighed]
+
+    def sizes(self, cause: str) -> dict[str, tuple[float, float]]:
+        """Mean and standard deviation of each parameter of a cause, given that it is there, over all sets with it.
+
+        KeyError where no set has it.
+        """
+        p = {entry.causes: entry.probability for entry in self.posterior}
+        having = [w for w in self.weighed if cause in w.entrant.names]
+        if not having:
+            raise KeyError(cause)
+        found = {}
+        for name in dict.fromkeys(
+            q.name for w in having for c in w.entrant.causes if c.name == cause for q in c.parameters
+        ):
+            free = [w for w in having if name in w.point]
+            weight = np.array([p[w.entrant.names] for w in free])
+            weight = weight / weight.sum() if weight.sum() > 0.0 else np.eye(len(free))[0]
+            mean, sd = np.array([(w.point[name], w.sd[name]) for w in free]).T
+            expected = float(weight @ mean)
+            found[name] = expected, float(np.sqrt(weight @ (sd**2 + (mean - expected) ** 2)))
+        return found
 
 
 class Contest:
@@ -124,26 +168,58 @@ class Contest:
         # of halves the mean alone: their covariance is of too few
         moved = [of(replace(whole, mean=half.mean, rest=half.rest)).log_z for half in halves]
         prior = sum(float(np.log(c.prior) - np.log1p(-c.prior)) for c in entrant.causes)
-        return Weighed(entrant, parameters, whole, own, own.log_z + prior, abs(moved[0] - moved[1]) / 2.0)
+        step = J @ (own.mean - x)
+        felt = float(step @ np.linalg.solve(whole.covariance, step))
+        error = abs(moved[0] - moved[1]) / 2.0
+        return Weighed(entrant, parameters, whole, own, own.log_z + prior, error, felt)
 
     def run(self, entrants: Sequence[Entrant]) -> Outcome:
-        """All weighed; those near the leader anew where their evidence says they are, as long as that gains."""
-        found = [self.weigh(e) for e in entrants]
-        for _ in range(TURNS):
-            top = max(w.log_evidence for w in found)
-            for j, w in enumerate(found):
-                if top - w.log_evidence < BEHIND:
-                    moved = self.weigh(replace(w.entrant, point={**w.entrant.point, **w.point}))
-                    self.say(
-                        f"{' + '.join(w.entrant.names) or 'faults only'}: {moved.log_evidence - w.log_evidence:+.1f}"
-                    )
-                    found[j] = max(w, moved, key=lambda x: x.log_evidence)
-        best: dict[tuple[str, ...], Weighed] = {}
-        for w in sorted(found, key=lambda w: -w.log_evidence):
-            best.setdefault(tuple(sorted(w.entrant.names)), w)
-        ranked = list(best.values())
+        """All sets of causes weighed, by the first entrant of each; those near the leader by their other ones too."""
+        sets: dict[tuple[str, ...], list[Entrant]] = {}
+        for e in entrants:
+            sets.setdefault(tuple(sorted(e.names)), []).append(e)
+        found = {key: self.weigh(of[0]) for key, of in sets.items()}
+        top = max(w.log_evidence for w in found.values())
+        for key, of in sets.items():
+            if top - found[key].log_evidence < BEHIND:
+                alike = [e for e in of[1:] if e.parameters == of[0].parameters][: EXPANSIONS - 1]
+                found[key] = together([self.settled(w) for w in (found[key], *map(self.weigh, alike))])
+        ranked = sorted(found.values(), key=lambda w: -w.log_evidence)
         error = float(np.sqrt(np.mean([w.error**2 for w in ranked[:2]])))
         return Outcome(posterior({w.entrant.names: w.log_evidence for w in ranked}, error), ranked)
+
+    def settled(self, w: Weighed) -> Weighed:
+        """An entrant weighed where its own evidence says it is: simulated there where that is not near."""
+        for _ in range(TURNS):
+            if w.felt < float(chi2.isf(OUTSIDE, len(w.parameters))):
+                break
+            moved = self.weigh(replace(w.entrant, point={**w.entrant.point, **w.point}))
+            self.say(f"{w.name}, simulated anew: {moved.log_evidence - w.log_evidence:+.1f} nats")
+            w = moved
+        return w
+
+
+def together(found: Sequence[Weighed]) -> Weighed:
+    """One set of causes by several points about which its response was taken for linear.
+
+    Each gives an estimate of one and the same integral: these are averaged, and sizes are those of the mixture. Where
+    the points disagree by more than noise, the response is not linear, and interval and error grow by that.
+    """
+    log_z = np.array([w.log_evidence for w in found])
+    weight = np.exp(log_z - logsumexp(log_z))
+    mean = weight @ np.array([w.evidence.mean for w in found])
+    second = weight @ np.array([w.evidence.sd**2 + w.evidence.mean**2 for w in found])
+    sd = np.sqrt(np.maximum(second - mean**2, 0.0))
+    best = found[int(np.argmax(log_z))]
+    total = float(logsumexp(log_z)) - float(np.log(len(found)))
+    of_all = Evidence(
+        total + best.evidence.log_z - best.log_evidence,
+        weight @ np.array([w.evidence.p_fault for w in found]),
+        mean,
+        sd,
+    )
+    between = float(weight @ (log_z - weight @ log_z) ** 2)
+    return replace(best, evidence=of_all, log_evidence=total, error=float(np.hypot(best.error, np.sqrt(between))))
 
 
 def _halves(records: Simulated) -> list[Simulated]:

@@ -21,6 +21,8 @@ from .statistic import Prediction
 
 WIDTHS = (0.25, 1.0, 4.0)  # of the slab, times the usual size
 WEIGHTS = (0.25, 0.5, 0.25)
+NEGLIGIBLE = 30.0  # [nats] behind the best, from which a term of a sum of some thousands does not count
+AT_ONCE = 256  # terms whose share within bounds is integrated at a time
 FAULT = 0.3  # prior probability that one fault is there
 
 
@@ -123,19 +125,34 @@ def evidence(
         constant = -0.5 * len(y) * np.log(2.0 * np.pi) - np.log(np.diag(L)).sum()
         gaussian = constant - 0.5 * (float(y @ y) - mean @ (A.T @ y)) - 0.5 * logdet
         prior_mass = np.where(P > 0.0, log_mass(low / np.where(P > 0, P, 1.0), high / np.where(P > 0, P, 1.0)), 0.0)
-        inside = log_box(mean, V, low, high) - prior_mass.sum(axis=1)
         rest = prediction.log_rest(law_error.of_rest(share))
-        found.append(gaussian + inside + log_prior + rest - np.log(len(shares)))
-        means.append(np.clip(mean, low, high))
-        variances.append(np.diagonal(V, axis1=1, axis2=2))
-    log_z = np.concatenate(found)
+        found.append(gaussian - prior_mass.sum(axis=1) + log_prior + rest - np.log(len(shares)))
+        means.append(mean)
+        variances.append(V)
+    log_z, u, var = np.concatenate(found), np.concatenate(means), np.concatenate(variances)
+    log_z = _within(log_z, u, var, low, high)
     total = float(logsumexp(log_z))
     weight = np.exp(log_z - total)
-    u, var = np.concatenate(means), np.concatenate(variances)
+    u, var = np.clip(u, low, high), np.diagonal(var, axis1=1, axis2=2)
     expected = weight @ u
     sd = np.sqrt(np.maximum(weight @ (var + u**2) - expected**2, 0.0))
     there = np.tile(subsets, (len(shares), 1))
     return Evidence(total, weight @ there, expected, sd)
+
+
+def _within(log_z: Array, mean: Array, cov: Array, low: Array, high: Array) -> Array:
+    """Log evidence of terms with the share that lies within bounds.
+
+    That share only takes: terms too far behind the best to count are left out before theirs is integrated.
+    """
+    order = np.argsort(-log_z)
+    found = np.full(len(log_z), -np.inf)
+    for first in range(0, len(order), AT_ONCE):
+        at = order[first : first + AT_ONCE]
+        if log_z[at[0]] < found.max() - NEGLIGIBLE:
+            break
+        found[at] = log_z[at] + log_box(mean[at], cov[at], low, high)
+    return found
 
 
 def _slabs(faults: Sequence[Parameter], causes: Sequence[Sequence[Parameter]]) -> tuple[Array, Array, Array]:

@@ -85,3 +85,34 @@ def test_what_a_grid_makes_of_all_blocks_is_part_of_the_noise(toys):
     ratio = np.sort(np.linalg.eigvals(np.linalg.solve(true, found)).real)
     assert ratio[0] > 0.5
     assert ratio[-1] < 2.5  # of 64 records and 4 grids
+
+
+def test_a_size_is_told_over_all_sets_that_have_the_cause(toys):
+    """Two sets that do the same, with other sizes of what they share: the interval holds both."""
+    toy = toys.plant(1, NAMES, seed=3)
+    toy.columns["c.size"] = toy.columns["b.size"] + 0.5 * toy.columns["a.size"]
+    toy.measured = toy.measured + 10.0 * toy.columns["a.size"] + 8.0 * toy.columns["b.size"]
+    sets = (("a", "b"), {"a.size": 10.0, "b.size": 8.0}), (("a", "c"), {"a.size": 6.0, "c.size": 8.0})
+    outcome = held(toy, entrant(toy), *(entrant(toy, *names, **point) for names, point in sets))
+    (mean, sd), *_ = outcome.sizes("a").values()
+    each = [w.point["a.size"] for w in outcome.weighed if "a" in w.entrant.names]
+    assert min(each) < mean < max(each)
+    assert sd > 0.45 * abs(each[0] - each[1])
+    with pytest.raises(KeyError):
+        outcome.sizes("nothing")
+
+
+def test_where_a_response_is_not_linear_the_interval_holds_what_other_points_say(toys):
+    """A response with ripples: about each point alone the deviation is too small, about three together it is true."""
+    alone, together = [], []
+    for seed in range(16):
+        toy = toys.plant(1, NAMES, seed=seed, usual=10.0)
+        toy.bend = lambda point, toy=toy: 1.5 * np.sin(2.0 * point.get("a.size", 0.0)) * toy.columns["a.size"]
+        truth = 20.0 + 0.4 * seed
+        toy.measured = toy.measured + toy.mean({"a.size": truth})
+        starts = [entrant(toy, "a", **{"a.size": truth + off}) for off in (-1.5, 0.2, 1.5)]
+        for of, found in ((starts[:1], alone), (starts, together)):
+            mean, sd = held(toy, entrant(toy), *of).sizes("a")["a.size"]
+            found.append((mean - truth) / sd)
+    assert np.mean(np.square(together)) < 0.6 * np.mean(np.square(alone))
+    assert np.max(np.abs(together)) < 4.0
