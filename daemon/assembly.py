@@ -75,13 +75,9 @@ def _assembled(settings: DaemonSettings, ear: Ear) -> Iterator[Service]:
         turn = Turn(presence, port.name, watch.listen, settings.standby)
         desk = AlarmDesk(alarm_settings, bundles, codec, Voice(port, turn), log, state)
         for runner in remote.values():
-            stack.callback(runner.close)
+            stack.enter_context(runner).watch()
         workers = {
-            method: (
-                Worker(remote[method].run, settings.queue, method, remote[method].probe)
-                if method in remote
-                else Worker(local, settings.queue, method)
-            )
+            method: Worker(remote[method].run if method in remote else local, settings.queue, method)
             for method in settings.monitor.slower
         }
         every = {method: slower.every for method, slower in settings.monitor.slower.items()}

@@ -14,7 +14,6 @@ from collections.abc import Callable
 from ema.identification import Estimate
 from ema.monitor import Job
 
-_PROBE_EVERY = 0.5  # [s]
 Answer = tuple[Job, Estimate | Exception]
 
 
@@ -27,12 +26,10 @@ class Worker:
         From a job to its estimate; what it raises is the answer then.
     size : int
         Jobs that may wait.
-    probe : callable, optional
-        Called every second while there is nothing to do.
     """
 
-    def __init__(self, run: Callable[[Job], Estimate], size: int, name: str, probe: Callable[[], None] | None = None):
-        self._run_job, self._probe = run, probe
+    def __init__(self, run: Callable[[Job], Estimate], size: int, name: str):
+        self._run_job = run
         self._jobs: queue.Queue[Job | None] = queue.Queue(size)
         self._answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
         self._n_pending = 0
@@ -71,19 +68,11 @@ class Worker:
         return self.answers()
 
     def _run(self) -> None:
-        while (job := self._next()) is not None:
+        while (job := self._jobs.get()) is not None:
             try:
                 self._answers.put((job, self._run_job(job)))
             except Exception as error:  # a defect in an identifier must not stop the monitor
                 self._answers.put((job, error))
-
-    def _next(self) -> Job | None:
-        while self._probe is not None:
-            try:
-                return self._jobs.get(timeout=_PROBE_EVERY)
-            except queue.Empty:
-                self._probe()
-        return self._jobs.get()
 
 
 def _until(deadline: float) -> float:

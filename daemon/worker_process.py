@@ -18,7 +18,7 @@ _LOOK_UP = 0.2  # how often a stop is looked for [s]
 
 
 class Server:
-    """Answers jobs on a Unix socket, one after the other.
+    """Answers jobs on a Unix socket, one after the other; whoever asks beside them whether it is alive, at once.
 
     Parameters
     ----------
@@ -29,14 +29,14 @@ class Server:
 
     def __init__(self, path: Path, bundles: Mapping[int, Bundle]):
         self._path = path
-        self._runner = Runner(bundles)
+        self._runner, self._one_job = Runner(bundles), threading.Lock()
         self._fingerprints = {number: wire.fingerprint(bundle) for number, bundle in bundles.items()}
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
         try:
             if path.is_socket() and not _listens(path):
                 path.unlink()
             self._socket.bind(str(path))
-            self._socket.listen(1)
+            self._socket.listen()
         except OSError as error:
             self._socket.close()
             raise BusError(f"{path}: the worker's socket cannot be made ({error.strerror})") from error
@@ -44,19 +44,27 @@ class Server:
     def run(self, stop: threading.Event) -> None:
         """Answer until `stop` is set; then remove the socket."""
         self._socket.settimeout(_LOOK_UP)
+        serving: list[threading.Thread] = []
         try:
             while not stop.is_set():
                 try:
                     connection, _ = self._socket.accept()
                 except TimeoutError:
                     continue
-                with connection:
-                    self._serve(connection, stop)
+                serving = [thread for thread in serving if thread.is_alive()]
+                serving.append(threading.Thread(target=self._serve, args=(connection, stop)))
+                serving[-1].start()
         finally:
+            for thread in serving:
+                thread.join()
             self._socket.close()
             self._path.unlink(missing_ok=True)
 
     def _serve(self, connection: socket.socket, stop: threading.Event) -> None:
+        with connection:
+            self._talk(connection, stop)
+
+    def _talk(self, connection: socket.socket, stop: threading.Event) -> None:
         connection.settimeout(_LOOK_UP)
         waiting = bytearray()
         while not stop.is_set():
@@ -81,7 +89,9 @@ class Server:
             job, fingerprint = wire.unpack_job(line)
             if self._fingerprints.get(job.actuator) != fingerprint:
                 raise WireError(f"the worker has another bundle for actuator {job.actuator}")
-            return answer.pack_answer(self._runner.run(job), job, fingerprint)
+            with self._one_job:
+                estimate = self._runner.run(job)
+            return answer.pack_answer(estimate, job, fingerprint)
         except Exception as error:  # the answer, whatever it is
             return answer.pack_error(error)
 

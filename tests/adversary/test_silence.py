@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import signal
 import socket
+import subprocess
 import threading
+from contextlib import suppress
 
 import numpy as np
 import pytest
-from attacked import of, reasons, sealed, statuses
+from attacked import EMA, PATIENCE, of, reasons, sealed, statuses
 
 from ema.bus import codec as codecs
 from ema.core.status import Lapse, Reason, ServiceState, Status
@@ -92,8 +95,34 @@ def test_never_heard_at_all(attack, tell):
 def test_no_worker_for_hf(attack, tell, tmp_path):
     daemon = attack(monitor={"slower": {"hf": {"every": "2 s"}}}, remote={"hf": str(tmp_path / "nobody.sock")})
     late = daemon.until_state(ServiceState.DEGRADED, Lapse.WORKER)
+    daemon.estimates(1)  # of a cycle that had begun before the daemon
     assert set(statuses(daemon.estimates(2))) == {Status.VALID}
     tell("no HF worker where one is configured", 1, f"degraded, `worker`, after {late:.1f} s; linear as before", "hf")
+
+
+def test_the_hf_worker_hangs(attack, tell, tmp_path):
+    """A real one, stopped by a signal, as by a debugger or a device that does not answer."""
+    path = tmp_path / "hf.sock"
+    hf = {"monitor": {"slower": {"hf": {"every": "1 s"}}}, "remote": {"hf": str(path)}}
+    daemon = attack(**hf)
+    with subprocess.Popen([EMA, "hf-worker", "--config", daemon.config], stderr=subprocess.DEVNULL) as worker:
+        try:
+            daemon.until(lambda one: one.name == "EstimateHf")
+            daemon.until_state(ServiceState.RUNNING)
+            worker.send_signal(signal.SIGSTOP)
+            late = daemon.until_state(ServiceState.DEGRADED, Lapse.WORKER)
+            assert set(statuses(daemon.estimates(2))) == {Status.VALID}
+            worker.send_signal(signal.SIGCONT)
+            again = daemon.until_state(ServiceState.RUNNING)
+            daemon.estimates(1, "Hf")
+            assert daemon.stop() == 0
+        finally:
+            worker.send_signal(signal.SIGCONT)
+            worker.terminate()
+            worker.wait(PATIENCE)
+    tell("SIGSTOP of the HF worker, with a job or without", 1,
+         f"degraded, `worker`, after {late:.1f} s; linear as before; running {again:.1f} s after SIGCONT",
+         "hf meanwhile")  # fmt: skip
 
 
 LIES = {
@@ -113,22 +142,22 @@ def test_the_worker_lies(attack, tell, tmp_path):
     ended = threading.Event()
 
     def serve(server):
-        nonlocal n_told
         while not ended.is_set():
             try:
                 connection, _ = server.accept()
             except TimeoutError:
                 continue
-            with connection, connection.makefile("rb") as said:
-                for line in said:
-                    answer = lies[n_told % len(lies)](line)
-                    n_told += b"i_hat" in line
-                    if answer is None:
-                        break
-                    try:
-                        connection.sendall(answer + b"\n")
-                    except OSError:
-                        break
+            threading.Thread(target=lie, args=(connection,), daemon=True).start()
+
+    def lie(connection):
+        nonlocal n_told
+        with connection, connection.makefile("rb") as said, suppress(OSError):
+            for line in said:
+                answer = lies[n_told % len(lies)](line)
+                n_told += b"i_hat" in line
+                if answer is None:
+                    break
+                connection.sendall(answer + b"\n")
 
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(str(path))
@@ -137,6 +166,7 @@ def test_the_worker_lies(attack, tell, tmp_path):
         liar = threading.Thread(target=serve, args=(server,), daemon=True)
         liar.start()
         daemon = attack(monitor={"slower": {"hf": {"every": "0.5 s"}}}, remote={"hf": str(path)})
+        daemon.estimates(1)  # of a cycle that had begun before the daemon
         estimates = daemon.estimates(len(lies) + 2)
         ended.set()
         liar.join()
