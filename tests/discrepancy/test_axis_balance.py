@@ -8,6 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.balance import balance
 from ema.discrepancy.axis.balance.smooth import bumps_at, local_polynomial
 from ema.discrepancy.axis.balance.telling import sentences, told
@@ -123,6 +124,19 @@ def test_noise_in_the_regressors_takes_nothing_from_the_mass(positioner):
     raw, corrected = found.model.coefficients[0], found.corrected.coefficients[0]
     assert abs(corrected - 90.0) < abs(raw - 90.0)
     assert corrected == pytest.approx(90.0, rel=0.01)
+
+
+@pytest.mark.parametrize("swing", [2e-5, 5e-5])
+def test_a_frame_that_swings_takes_nothing_from_the_mass(positioner, swing):
+    """45 Hz that no force makes: narrow test functions see it as motion, and a mass of 38 or 10 kg in place of 90."""
+    (cycle,) = positioner.table(positioner.Table(), 1, seconds=12.0).cycles
+    seen = cycle["q"] + swing * np.sin(2 * np.pi * 45.0 * cycle["t"])
+    record = Record((Cycle(0, {**cycle.channels, "q": seen}),))
+    plant = AxisPlant(LinearAxis.model_validate(positioner.table_plant(positioner.Table())), [record])
+    plant.between = "held"
+    found = told(balance(plant), linear=True)
+    assert found["base"]["inertia"]["value"] == pytest.approx(90.0, rel=0.02)
+    assert found["terms"] == []
 
 
 def test_irregular_time_stamps_are_taken_as_they_are(positioner):

@@ -53,7 +53,7 @@ def zeros(plant: AxisPlant) -> dict[str, Zero]:
     if not lines:
         return {}
     first = next((name for name, own in lines.items() if own), next(iter(lines)))
-    return {name: _between(lines[first], own) for name, own in lines.items() if name != first}
+    return {name: between(lines[first], own) for name, own in lines.items() if name != first}
 
 
 def _lines(plant: AxisPlant, name: str) -> dict[float, complex]:
@@ -66,7 +66,8 @@ def _lines(plant: AxisPlant, name: str) -> dict[float, complex]:
     return {n: complex(c, -s) for n, (c, s) in zip(found.orders, found.parts, strict=True)}
 
 
-def _between(reference: dict[float, complex], own: dict[float, complex]) -> Zero:
+def between(reference: dict[float, complex], own: dict[float, complex]) -> Zero:
+    """Where the zero of a record lies from that of another, by the lines z_n of both."""
     shared = tuple(sorted(reference.keys() & own.keys()))
     if not shared:
         return Zero(None)

@@ -18,6 +18,7 @@ from .course import Course, courses
 from .law import Acting, Law
 from .laws import LINEAR, LINES, ROTARY, laws, of_base
 from .links import LINKS, links
+from .own_zeros import with_zeros
 from .regression import BY_RECORD, Plain, Regression, fitted
 from .rows import LONGEST, STILL, Rows, half_widths, rows
 
@@ -32,6 +33,7 @@ SELDOM = 0.05  # share of draws that another law must win to be one that the rec
 CONSTANT = 0.02  # share by which a voltage must change to drive by more than its value
 APART = 0.05  # of a law's size that must stand out of what inertia, dry friction and drag do
 N_WIDTHS = 3  # rounds
+MOVED = 2.0  # deviations of the difference between two widths, from which an inertia is another
 N_WIDER = 3  # times that test functions are made twice as wide
 LONG = 0.5  # share of a row that must show which way friction acts, however small that is
 BY_NAME = BY_RECORD.replace(" ", "_")
@@ -105,7 +107,7 @@ def balance(plant: AxisPlant) -> Balance | None:
     """The balance of all records; None where no stretch of motion is long enough."""
     p = plant.plant
     plain = Plain(p.inertia, p.F_d, p.C, 1.0 if p.is_force else float(p.k_t or 1.0))
-    recorded = courses(plant)
+    recorded = with_zeros(plant, courses(plant), plain)
     found = rows(plant, recorded)
     if found is None:
         return None
@@ -158,7 +160,7 @@ def _is_moved(model: Regression, slower: Rows, plain: Plain) -> bool:
     k = model.base.index("inertia")
     here, there = float(model.coefficients[k]), float(other.coefficients[k])
     spread = float(np.sqrt(abs(other.covariance()[k, k] - model.covariance()[k, k])))
-    return abs(there - here) > max(CLEAR * spread, INEXACT * max(abs(here), abs(there)))
+    return abs(there - here) > max(MOVED * spread, INEXACT * max(abs(here), abs(there)))
 
 
 def every_law(found: Rows, *, linear: bool) -> list[Law]:

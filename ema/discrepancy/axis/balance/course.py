@@ -26,7 +26,8 @@ class Course:
     `drive` is the channel that drives, `current` the measured current beside a driving voltage; `position` or `speed`
     is None where it was not recorded. `noise` is the rms of each by channel name. A `static` course holds readings at
     rest, each approached in `direction`. `late`: samples by which the drive acts later than its channel says (one that
-    is held from sample to sample: half a sample). `other`: angle of a neighbouring axis.
+    is held from sample to sample: half a sample). `other`: angle of a neighbouring axis. `zero`: angle to be added to
+    the positions.
     """
 
     record: str
@@ -42,6 +43,7 @@ class Course:
     direction: Array | None = None
     late: float = 0.0
     other: Array | None = None
+    zero: float = 0.0
 
     @property
     def period(self) -> float:

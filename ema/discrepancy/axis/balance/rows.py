@@ -254,7 +254,7 @@ def _motion(plant: AxisPlant, model: axis.Model, c: Course, half: float) -> Moti
         w, a = local_polynomial(c.t, c.speed, n_half, 2)[:2]
         noise = c.noise.get("speed", 0.0) / n_half**0.5
         theta = np.concatenate(([0.0], np.cumsum(np.diff(c.t) * 0.5 * (w[1:] + w[:-1]))))
-    theta = theta + _zero(plant, c)
+    theta = theta + c.zero
     rest = max(SEEN * noise, CREEP * float(np.sqrt(np.mean(w**2))))
     direction = np.where(np.abs(w) > rest, np.sign(w), 0.0)
     i, drive = _current(c, w, model.z)
@@ -273,19 +273,13 @@ def _at_rest(plant: AxisPlant, model: axis.Model, c: Course) -> Motion:
     assert c.position is not None
     assert c.direction is not None
     k_t = float(plant.plant.k_t or 1.0)
-    theta = c.position + _zero(plant, c)
+    theta = c.position + c.zero
     held = axis.holding(model, theta, c.direction, c.t)
     zero = np.zeros(len(c.t))
     drive = k_t * c.drive
     return Motion(
         c.t, theta, zero, zero, drive, drive - k_t * held, c.direction, True, np.ones(len(c.t), bool), dT=c.dT
     )  # fmt: skip
-
-
-def _zero(plant: AxisPlant, c: Course) -> float:
-    """What is to be added to the angles of a record. [rad]"""
-    found = plant.zeros.get(c.record)
-    return (found.angle or 0.0) if found else 0.0
 
 
 def _current(c: Course, w: Array, z: Array) -> tuple[Array, Array]:

@@ -1,0 +1,47 @@
+"""Angle zeros of records as the balance sees them: by lines of torque that are fitted beside inertia and friction.
+
+Which lines two records share is known before (`ema.discrepancy.axis.zeros`), from the residual of the plant file's
+numbers; what these miss moves a line of many periods by more than its place is sure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ema.discrepancy.axis.zeros import between
+
+from .apart import by_record
+from .course import Course
+from .laws import laws
+from .regression import Plain, fitted
+from .rows import rows
+
+if TYPE_CHECKING:
+    from ema.discrepancy.axis.plant import AxisPlant
+
+
+def with_zeros(plant: AxisPlant, recorded: Sequence[Course], plain: Plain) -> list[Course]:
+    """The courses with what is to be added to their angles."""
+    moved = {name: zero.orders for name, zero in plant.zeros.items() if zero.angle}
+    raw = rows(plant, list(recorded)) if moved else None
+    if raw is None:
+        return list(recorded)
+    names = raw.motion.records
+    orders = sorted({n for own in moved.values() for n in own})
+    keys = {f"line {n:.5g}": n for n in orders}
+    lines = [by_record(law, len(names)) for law in laws(raw.motion, linear=False) if law.key in keys]
+    fit = fitted(raw, plain, lines, apart=True)
+    parts = [fit.coefficients[fit.part(law)].reshape(-1, 2) for law in lines]
+    seen = [keys[law.repeats.key] for law in lines if law.repeats is not None]
+    z = {
+        name: {n: complex(own[k, 0], -own[k, 1]) for n, own in zip(seen, parts, strict=True)}
+        for k, name in enumerate(names)
+    }
+    reference = next(name for name in names if name not in plant.zeros)
+    angles = {
+        name: between({n: z[reference][n] for n in own if n in z[reference]}, z[name]).angle or 0.0
+        for name, own in moved.items()
+    }
+    return [replace(c, zero=angles.get(c.record, 0.0)) for c in recorded]
