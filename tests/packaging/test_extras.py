@@ -33,7 +33,7 @@ def test_a_command_names_an_extra_that_there_is(entry):
     [
         (["build", "--config", "config/builder-quick.yaml", "--out", "{}/b"], "numba", "build"),
         (["simulate", "--scenario", "config/scenario.yaml", "--csv", "{}/x.csv"], "numba", "build"),
-        (["doctor"], "can", "monitor"),
+        (["alarm", "list"], "can", "monitor"),
     ],
 )
 def test_a_package_that_is_not_there_is_told_with_the_extra_that_brings_it(words, missing, extra, tmp_path):
