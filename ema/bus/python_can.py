@@ -10,9 +10,12 @@ import numpy as np
 from ema.core import frames as fr
 from ema.core.can_messages import fill
 from ema.core.can_messages import message as can_message
+from ema.core.status import BusState
 
 from .port import MAX_BATCH, Port
 
+# PASSIVE is of most of them a controller that only listens: it marks no errors for others either.
+_STATES = {can.BusState.ACTIVE: BusState.ACTIVE, can.BusState.PASSIVE: BusState.ERROR_PASSIVE}
 _MAX_ERRORS = 100  # in one read, before it gives the processor back
 _PAUSE = 0.05  # after a read that met only errors [s]
 
@@ -24,6 +27,18 @@ class PythonCanPort(Port):
         super().__init__(name)
         self._bus = bus
         self._failing = False
+        self._no_state = ""  # why the driver did not tell its state, as said last
+
+    @property
+    def bus_state(self) -> BusState:
+        """As the interface's driver tells it: few do, of the others it is always active."""
+        try:
+            return _STATES.get(self._bus.state, BusState.BUS_OFF)
+        except (can.CanError, OSError, NotImplementedError) as error:
+            if str(error) != self._no_state:
+                self._no_state = str(error)
+                self._events.append(f"{self.name}: {error}")
+            return BusState.DOWN
 
     def read(self, timeout: float) -> np.ndarray:
         """See Port."""

@@ -7,6 +7,7 @@ from ema.bus.interface import BusSettings, open_bus, parse
 from ema.bus.port import MAX_BATCH
 from ema.bus.python_can import PythonCanPort
 from ema.core.errors import BusError
+from ema.core.status import BusState
 
 
 @pytest.mark.parametrize(
@@ -65,6 +66,46 @@ def test_auto_takes_the_next_best_and_says_why(monkeypatch):
     with open_bus(parse("auto")) as port:
         assert port.choice.startswith("bus virtual:ema chosen; bus socketcan:no-such-vcan cannot be opened (")
         assert "udp_multicast:10.0.0.1" in port.choice
+
+
+class Controller(can.BusABC):
+    """A controller whose driver tells its state."""
+
+    state = can.BusState.ACTIVE
+
+    def __init__(self):
+        super().__init__("controller")
+
+    def send(self, msg, timeout=None):
+        pass
+
+
+class Unplugged(Controller):
+    @property
+    def state(self):
+        raise can.CanOperationError("the device has gone")
+
+
+@pytest.mark.parametrize(
+    ("told", "expected"),
+    [
+        (can.BusState.ACTIVE, BusState.ACTIVE),
+        (can.BusState.PASSIVE, BusState.ERROR_PASSIVE),
+        (can.BusState.ERROR, BusState.BUS_OFF),
+        (None, BusState.BUS_OFF),  # of etas: neither active nor passive
+    ],
+)
+def test_the_state_of_a_controller_is_what_its_driver_tells(told, expected):
+    bus = Controller()
+    bus.state = told
+    with PythonCanPort(bus, "controller") as port:
+        assert port.bus_state is expected
+
+
+def test_a_driver_that_cannot_tell_its_state_any_more_is_down_and_says_why_once():
+    with PythonCanPort(Unplugged(), "controller") as port:
+        assert [port.bus_state, port.bus_state] == [BusState.DOWN, BusState.DOWN]
+        assert port.take_events() == ["controller: the device has gone"]
 
 
 class Storm(can.BusABC):
