@@ -15,7 +15,8 @@ EFFECT = Effect(
     parameters=(
         Parameter("per_ampere", "N m/A", 0.0, -1.0, 1.0, 0.001, "torque lost with positive and gained with negative"),
     ),
-    sentence="the drive gives {per_ampere:+.3g} N m/A less with positive current, and as much more with negative",
+    sentence="one polarity of the drive gives more than the other: what opposes it has a part of {per_ampere:+.3g} "
+    "N m/A times the size of the current, whichever its sign",
     separated_by="the same motions with the drive's polarity reversed",
     laws={"shaft_torque": torque},
     mistaken_for=("k1",),

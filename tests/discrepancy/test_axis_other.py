@@ -89,6 +89,8 @@ def test_a_drive_that_gives_more_one_way_than_the_other_is_named(axis_other):
     (found,) = look(axis_other, "stage", EVEN=0.1).effects
     assert found["name"] == "drive_unequal"
     assert found["parameters"]["per_ampere"]["value"] == pytest.approx(-0.1, abs=0.001)
+    assert found["parameters"]["per_ampere"]["unit"] == "1"  # of a force, and no newtons per ampere
+    assert "a part of -0.1 times the size of the force" in found["sentence"]
 
 
 def test_friction_that_falls_fast_with_speed_is_named_though_motion_cannot_be_foretold_for_long(axis_other):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
 from .cogging import MIN_LINE
-from .linear import in_metres
+from .linear import by_drive, in_metres
 from .naming import numbers_of
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def effects(plant: AxisPlant, found: Sequence[Candidate], point: Point, drawn: S
             if effect.name == "cogging" and values["amplitude"] < MIN_LINE * strongest:
                 continue
             key = _key(own.effects, values)
-            said = in_metres if isinstance(plant.plant, LinearAxis) else str
+            said = _said(plant)
             unit = {p.name: said(p.unit) for p in effect.parameters}
             parameters = {}
             for name, value in values.items():
@@ -56,6 +56,12 @@ def effects(plant: AxisPlant, found: Sequence[Candidate], point: Point, drawn: S
             }
             out.append(entry | (_line(plant, values) if effect.name == "cogging" else {}))
     return out
+
+
+def _said(plant: AxisPlant) -> Callable[[str], str]:
+    """How sentences and units are said of this axis and its drive."""
+    units = in_metres if isinstance(plant.plant, LinearAxis) else str
+    return lambda text: units(by_drive(text, plant.plant.drive))
 
 
 def _line(plant: AxisPlant, values: dict[str, float]) -> dict[str, Any]:

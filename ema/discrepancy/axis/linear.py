@@ -24,6 +24,18 @@ SAID = {  # of those that begin alike the longest first
 }
 
 
+# Of a drive whose own torque or force is recorded, what is per ampere of a current is a share.
+RECORDED = {"N m/A times the size of the current": "times the size of the {drive}", "N m/A": "1"}
+
+
+def by_drive(text: str, drive: str) -> str:
+    """A sentence or a unit of what is in proportion to the drive: there is no current where its torque is recorded."""
+    if drive in ("force", "torque"):
+        for said, instead in RECORDED.items():
+            text = text.replace(said, instead.format(drive=drive))
+    return text
+
+
 def in_metres(text: str) -> str:
     """A sentence or a unit with metres for radians and newtons for newton metres."""
     return re.sub("|".join(map(re.escape, SAID)), lambda found: SAID[found[0]], text)
