@@ -199,7 +199,11 @@ class Findings:
             left = f"That is not all: on held-out parts {self.gain.rest:.3g} times what noise makes is left"
             said.append(left + ("; its structure: " + describe(self.structure) if self.structure else "") + ".")
         if self.verdict == "unexplained":
-            none = "none that stands out" if not self.balance.get("terms") else "what the balance shows"
+            none = (
+                "none that stands out"
+                if not (self.balance.get("terms") or self.balance.get("given"))
+                else "what the balance shows"
+            )
             said.append(f"No effect of the library explains the rest; its structure: {describe(self.structure, none)}.")
         return said
 

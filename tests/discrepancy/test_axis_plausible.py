@@ -58,3 +58,9 @@ def test_what_cannot_be_is_flagged_with_what_would_make_it(record, point, change
 
     (one,) = said(bench(**record), point, **changed)
     assert re.search(text, one)
+
+
+def test_what_is_fitted_without_a_declared_neighbour_is_no_flag():
+    (cycle,) = bench().cycles
+    beside = Record((Cycle(0, {**cycle.channels, "theta_n": 0.1 * np.sin(cycle["t"])}),))
+    assert said(beside, {"F_d": 0.02, "J": 4e-4}, fitted=["J"], neighbour="inner") == []

@@ -118,3 +118,9 @@ def test_the_report_says_the_set_where_there_is_one(others, headline, tmp_path):
             seen = look(tmp_path / "report.html", *screen)
             assert seen["found"] == []
             assert not seen["wide"]
+
+
+def test_rigid_body_terms_that_the_balance_has_are_never_nothing_that_stands_out():
+    gain = Gain(0.1, 0.1, 0.1, 0.1, 0.01)
+    (said,) = Findings("unexplained", [], gain, balance={"terms": [], "given": [{"name": "linked_axis"}]}).sentences()
+    assert "what the balance shows" in said

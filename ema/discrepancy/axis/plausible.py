@@ -87,7 +87,7 @@ def _of_power(plant: AxisPlant) -> list[str]:
 
 def _fitted(plant: AxisPlant, outcome: Outcome) -> list[str]:
     p, out = plant.plant, []
-    for f in plant.base:
+    for f in plant.base if p.neighbour is None else ():  # free runs know nothing of a neighbour
         if f.name not in MADE_BY or f.name not in outcome.point:
             continue
         value, nominal = float(outcome.point[f.name]), float(getattr(p, f.name))

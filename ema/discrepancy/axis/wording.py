@@ -22,6 +22,10 @@ from .plant import AxisPlant
 from .plausible import implausible
 from .plausible import told as electrical
 
+ALONE = (
+    "free runs know nothing of the neighbouring axis: their verdict and fitted values are of this axis alone; the "
+    "balance knows both"
+)
 MOVED = 0.02  # of the plant file's friction: less is not worth a word
 
 
@@ -52,6 +56,8 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     found, added = together(plant, [_effect(e) for e in outcome.effects], verdict)
     found = with_external(plant, found)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
+    if plant.plant.neighbour is not None:
+        notes.append(ALONE)
     notes += [f"implausible: {text}" for text in implausible(plant, outcome)]
     notes += _moved(plant, outcome) + _kinds(plant) + _zeros(plant, outcome)
     return shared.Findings(
@@ -79,7 +85,7 @@ def _balance(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
         out["next"] = asked
     if seen := electrical(plant):
         out["electrical"] = seen
-    if not all(effects(found, term) for term in found.terms):
+    if found.given or not all(effects(found, term) for term in found.terms):
         return out  # a law that the axis model does not simulate: free runs say nothing of it
     run = plant.errors(point(found, linear=linear), range(len(plant.blocks)))
     out["free_run"] = {"err": run.error, "noise_floor": run.noise_floor}
