@@ -64,3 +64,14 @@ def test_what_is_fitted_without_a_declared_neighbour_is_no_flag():
     (cycle,) = bench().cycles
     beside = Record((Cycle(0, {**cycle.channels, "theta_n": 0.1 * np.sin(cycle["t"])}),))
     assert said(beside, {"F_d": 0.02, "J": 4e-4}, fitted=["J"], neighbour="inner") == []
+
+
+def test_a_motor_that_rolls_at_one_voltage_shows_no_resistance():
+    """The current hardly changes: least squares finds its noise, and a sixth of R."""
+    rng = np.random.default_rng(2)
+    t = np.arange(4000) * 1e-3
+    w = 20.0 + 0.3 * np.sin(12.0 * 20.0 * t)
+    i = (1.0 - 0.0333 * w) / 0.5
+    noisy = {"i_q": i + 0.02 * rng.standard_normal(len(t)), "w_m": w + 0.06 * rng.standard_normal(len(t))}
+    record = Record((Cycle(0, {"t": t, "u_q": np.ones(len(t)), "theta_m": np.cumsum(w) * 1e-3, **noisy}),))
+    assert said(record) == []

@@ -29,6 +29,7 @@ DISAGREE = 0.2  # of k_e, beyond which the record contradicts the plant file's (
 N_BLOCKS, FEWEST = 24, 240
 N_HALF = 5  # samples to each side, over which the speed and the current's slope are taken
 CLEAR = 3.0  # deviations
+NOISY = 0.05  # share of the current's power beside the speed that may be noise: by so much R is too small
 MADE_BY = {
     "R": "a voltage that is commanded and not measured, an inverter's drop, or a duty taken for another supply",
     "L": "a current or voltage that is filtered or late",
@@ -113,6 +114,10 @@ def electrical(plant: AxisPlant) -> Electrical | None:
     size = np.linalg.norm(A, axis=0)
     if len(u) < FEWEST or not (size > 0.0).all() or np.linalg.cond(A / size) > 100.0:
         return None
+    noise = max((b.noise["i_q"].sigma for b in plant.benches if "i_q" in b.noise), default=0.0)
+    beside = A[:, 0] - A[:, 1:] @ np.linalg.lstsq(A[:, 1:], A[:, 0], rcond=None)[0]
+    if noise**2 > NOISY * float(np.mean(beside**2)):
+        return None  # what the current does beside the speed is its noise: it would take from R
     c = np.linalg.lstsq(A, u, rcond=None)[0]
     parts = np.array_split(np.arange(len(u)), N_BLOCKS)
     without = [np.linalg.lstsq(np.delete(A, k, axis=0), np.delete(u, k), rcond=None)[0] for k in parts]
