@@ -7,6 +7,9 @@
 `pack`          windows of one record in contiguous arrays
 `whitening`     free-run residuals → independent standard normal numbers, by the noise's own dynamics
 `weak_form`     torque residual along the measured motion, integrated against test functions
+`measured`      what searches and the balance need of the plant
+`sizes`         typical sizes in the records
+`screened`      effects that are tried where the balance shows their law
 `candidates`    library effects scaled to this axis, with starts
 `cogging`       the order scan
 `gear`          the scan for a resonance of a gear that gives

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,63 +14,18 @@ from ema.models.axis_config import LinearAxis
 from .cogging import cogging_candidate
 from .fading import fading_candidate
 from .gear import gear_candidate
-from .screened import screened
+from .sizes import Sizes, sizes
 from .stretch import stretch_candidate
 
 if TYPE_CHECKING:
-    from .plant import AxisPlant
+    from .measured import Measured
 
 PRIOR = 0.5  # standard deviation of a fitted parameter about the plant file's value, relative
 SHAPES = ("roundness",)  # of a law
 BASE_RANGE = 20.0  # a fitted parameter stays within this factor of the plant file's value
 
 
-@dataclass(frozen=True)
-class Sizes:
-    """Typical sizes in the records: rms of drive torque, speed, drive, voltage; extent of position; sample period."""
-
-    torque: float
-    speed: float
-    drive: float
-    current: float
-    voltage: float
-    centre: float
-    half_range: float
-    period: float
-
-
-def sizes(plant: AxisPlant) -> Sizes:
-    """Sizes over all records; the largest where records differ."""
-    p = plant.plant
-    moving = [w for w in plant.windows if not w.static] or list(plant.windows)
-    drive = _rms(np.concatenate([w.drive for w in plant.windows]))
-    speed = _rms(np.concatenate([w.speed for w in moving])) or 1.0
-    k_t = float(p.k_t or 1.0)
-    current, voltage = drive, 1.0
-    if p.drive == "voltage":
-        current, voltage = drive / max(float(p.R or 1.0), 1e-9), drive
-        for b in plant.benches:
-            if "i_q" in b.roles.outputs:
-                row = b.roles.outputs.index("i_q")
-                current = _rms(np.concatenate([w.outputs[row] for w in b.windows]))
-    elif p.drive == "speed-loop":
-        current = max(p.F_d, 1e-12) / k_t + p.inertia * speed / k_t
-    for b in plant.benches:
-        if "u_q" in b.roles.outputs and not b.static:
-            row = b.roles.outputs.index("u_q")
-            voltage = max(voltage if voltage != 1.0 else 0.0, _rms(np.concatenate([w.outputs[row] for w in b.windows])))
-    torque = drive if p.is_force else k_t * current
-    position = np.concatenate([w.position for w in moving])
-    low, high = float(position.min()), float(position.max())
-    period = max((w.period for w in moving if not w.static), default=1e-3)
-    return Sizes(torque, speed, drive, current, voltage, 0.5 * (low + high), max(0.5 * (high - low), 1e-12), period)
-
-
-def _rms(x: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(x**2)))
-
-
-def base(plant: AxisPlant) -> tuple[Free, ...]:
+def base(plant: Measured) -> tuple[Free, ...]:
     """Friction level, and the parameters the plant file names under `fitted`."""
     p, s = plant.plant, sizes(plant)
     unit = "N" if isinstance(p, LinearAxis) else "N m"
@@ -90,7 +44,7 @@ def base(plant: AxisPlant) -> tuple[Free, ...]:
     return tuple(free)
 
 
-def library(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candidate]:
+def library(plant: Measured, point: Point, blocks: Sequence[int]) -> list[Candidate]:
     """Every effect of the library that has a meaning for this axis and its channels."""
     s = sizes(plant)
     found = [c for name in registry() if (c := _candidate(plant, s, name, point)) is not None]
@@ -101,10 +55,10 @@ def library(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candi
         stretch_candidate(plant, s, point, blocks),
         fading_candidate(plant, s, point, blocks),
     )
-    return [*found, *(c for c in searched if c is not None), *screened(plant, point)]
+    return [*found, *(c for c in searched if c is not None)]
 
 
-def _candidate(plant: AxisPlant, s: Sizes, name: str, point: Point) -> Candidate | None:
+def _candidate(plant: Measured, s: Sizes, name: str, point: Point) -> Candidate | None:
     build = _BUILDERS.get(name)
     have = any(key.startswith(f"{name}.") for key in point)
     if build is None or have or "axis" not in registry()[name].plants:
@@ -125,7 +79,7 @@ def _candidate(plant: AxisPlant, s: Sizes, name: str, point: Point) -> Candidate
     return Candidate(name, name, free, tuple(grid), neutral)
 
 
-def _clock_of_the_drive(plant: AxisPlant, s: Sizes, point: Point) -> Candidate | None:
+def _clock_of_the_drive(plant: Measured, s: Sizes, point: Point) -> Candidate | None:
     """A drive that is sampled by a clock of its own: what it is late by adds up from the record's start to its end."""
     name = "clock_skew.currents"
     moving = [w for w in plant.windows if not w.static]
@@ -141,30 +95,30 @@ def _clock_of_the_drive(plant: AxisPlant, s: Sizes, point: Point) -> Candidate |
 _Spec = dict[str, tuple[float, float, Sequence[float], float]]
 
 
-def _has(plant: AxisPlant, channel: str) -> bool:
+def _has(plant: Measured, channel: str) -> bool:
     return any(channel in b.roles.outputs for b in plant.benches)
 
 
-def _rotary(plant: AxisPlant) -> bool:
+def _rotary(plant: Measured) -> bool:
     return not isinstance(plant.plant, LinearAxis)
 
 
-def _viscous(plant: AxisPlant, s: Sizes) -> _Spec:
+def _viscous(plant: Measured, s: Sizes) -> _Spec:
     c = s.torque / s.speed
     return {"coefficient": (-plant.plant.C, 3.0 * c, (0.05 * c,), 0.05 * c)}
 
 
-def _quadratic(plant: AxisPlant, s: Sizes) -> _Spec:
+def _quadratic(plant: Measured, s: Sizes) -> _Spec:
     c = s.torque / s.speed**2
     return {"coefficient": (0.0, 3.0 * c, (0.05 * c,), 0.05 * c)}
 
 
-def _spring(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _spring(plant: Measured, s: Sizes) -> _Spec | None:
     k = s.torque / s.half_range  # near a resonance it moves farther than the drive could hold it
     return {"stiffness": (-50.0 * k, 50.0 * k, (0.05 * k, 2.0 * k), 0.05 * k)}
 
 
-def _flux(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _flux(plant: Measured, s: Sizes) -> _Spec | None:
     if plant.plant.is_force:
         return None
     spec: _Spec = {"change": (-0.4, 0.4, (-0.02,), 0.02)}
@@ -174,7 +128,7 @@ def _flux(plant: AxisPlant, s: Sizes) -> _Spec | None:
     return spec
 
 
-def _resistance(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _resistance(plant: Measured, s: Sizes) -> _Spec | None:
     if not (_has(plant, "u_q") or plant.plant.drive == "voltage") or "R" in plant.plant.fitted:
         return None
     spec: _Spec = {"change": (-0.6, 2.0, (0.05,), 0.05)}
@@ -183,7 +137,7 @@ def _resistance(plant: AxisPlant, s: Sizes) -> _Spec | None:
     return spec
 
 
-def _drop(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _drop(plant: Measured, s: Sizes) -> _Spec | None:
     if not (_has(plant, "u_q") or plant.plant.drive == "voltage"):
         return None
     return {
@@ -193,7 +147,7 @@ def _drop(plant: AxisPlant, s: Sizes) -> _Spec | None:
     }
 
 
-def _sag(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _sag(plant: Measured, s: Sizes) -> _Spec | None:
     U = plant.plant.V_dc
     if U is None or not (_has(plant, "u_q") or plant.plant.drive == "voltage"):
         return None
@@ -201,52 +155,52 @@ def _sag(plant: AxisPlant, s: Sizes) -> _Spec | None:
     return {"resistance": (0.0, 0.2 * R, (0.01 * R,), 0.01 * R)}
 
 
-def _saturation(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _saturation(plant: Measured, s: Sizes) -> _Spec | None:
     if plant.plant.is_force:
         return None
     return {"emf": (0.0, 0.3 / s.current**2, (0.03 / s.current**2,), 0.02 / s.current**2)}
 
 
-def _resolver(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _resolver(plant: Measured, s: Sizes) -> _Spec | None:
     if not _rotary(plant):
         return None
     parts = ("once_cosine", "once_sine", "twice_cosine", "twice_sine")
     return {name: (-0.2, 0.2, (1e-3,), 0.01) for name in parts}
 
 
-def _encoder(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _encoder(plant: Measured, s: Sizes) -> _Spec | None:
     return _resolver(plant, s) if _has(plant, "theta_m") and _has(plant, "w_m") else None
 
 
-def _speed_delay(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _speed_delay(plant: Measured, s: Sizes) -> _Spec | None:
     if not (_has(plant, "w_m") or _has(plant, "v")):
         return None
     return {"time": (0.0, 20.0 * s.period, (0.3 * s.period, 3.0 * s.period), 0.3 * s.period)}
 
 
-def _position_delay(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _position_delay(plant: Measured, s: Sizes) -> _Spec | None:
     if not (_has(plant, "theta_m") or _has(plant, "q")):
         return None
     return {"time": (0.0, 20.0 * s.period, (0.3 * s.period, 3.0 * s.period), 0.3 * s.period)}
 
 
-def _inertia(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _inertia(plant: Measured, s: Sizes) -> _Spec | None:
     if {"J", "M"} & set(plant.plant.fitted) or all(w.static for w in plant.windows):
         return None
     return {"change": (-0.8, 4.0, (0.02,), 0.03)}
 
 
-def _drive_gain(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _drive_gain(plant: Measured, s: Sizes) -> _Spec | None:
     return None if plant.plant.drive == "speed-loop" else {"gain": (-0.5, 1.0, (0.02,), 0.02)}
 
 
-def _drive_offset(plant: AxisPlant, s: Sizes) -> _Spec | None:
+def _drive_offset(plant: Measured, s: Sizes) -> _Spec | None:
     if plant.plant.drive == "speed-loop":
         return None
     return {"offset": (-3.0 * s.drive, 3.0 * s.drive, (0.02 * s.drive,), 0.02 * s.drive)}
 
 
-_BUILDERS: dict[str, Callable[[AxisPlant, Sizes], _Spec | None]] = {
+_BUILDERS: dict[str, Callable[[Measured, Sizes], _Spec | None]] = {
     "viscous_drag": _viscous,
     "quadratic_drag": _quadratic,
     "asymmetric_friction": lambda plant, s: {"asymmetry": (-0.95, 0.95, (0.1,), 0.05)},

@@ -17,7 +17,7 @@ from .naming import line
 from .weak_form import FEWEST, Weak, thinned, weak_form
 
 if TYPE_CHECKING:
-    from .plant import AxisPlant
+    from .measured import Measured
 
 MAX_ORDER = 240
 MAX_LINES = 8
@@ -90,7 +90,7 @@ def integer_orders(weak: Weak) -> Array:
     return np.arange(lowest, MAX_ORDER + 1, dtype=float)
 
 
-def cogging_candidate(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> Candidate | None:
+def cogging_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Candidate | None:
     """Lines of integer order that stand out of the torque residual, or None."""
     if isinstance(plant.plant, LinearAxis):
         return None

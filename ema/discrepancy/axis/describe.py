@@ -16,12 +16,12 @@ from .linear import by_drive, in_metres
 from .naming import numbers_of
 
 if TYPE_CHECKING:
-    from .plant import AxisPlant
+    from .measured import Measured
 
 INTERVAL = (2.5, 97.5)  # percent
 
 
-def effects(plant: AxisPlant, found: Sequence[Candidate], point: Point, drawn: Sequence[Point]) -> list[dict[str, Any]]:
+def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Sequence[Point]) -> list[dict[str, Any]]:
     """One entry per effect (one per cogging line): name, sentence, parameters with intervals."""
     own = numbers_of(point)
     samples = [numbers_of(p) for p in drawn]
@@ -58,13 +58,13 @@ def effects(plant: AxisPlant, found: Sequence[Candidate], point: Point, drawn: S
     return out
 
 
-def _said(plant: AxisPlant) -> Callable[[str], str]:
+def _said(plant: Measured) -> Callable[[str], str]:
     """How sentences and units are said of this axis and its drive."""
     units = in_metres if isinstance(plant.plant, LinearAxis) else str
     return lambda text: units(by_drive(text, plant.plant.drive))
 
 
-def _line(plant: AxisPlant, values: dict[str, float]) -> dict[str, Any]:
+def _line(plant: Measured, values: dict[str, float]) -> dict[str, Any]:
     """What else makes a torque line of this order."""
     return _unbalance(values) if round(values["order"]) == 1 else _electrical(plant, values)
 
@@ -80,7 +80,7 @@ def _unbalance(values: dict[str, float]) -> dict[str, Any]:
     }
 
 
-def _electrical(plant: AxisPlant, values: dict[str, float]) -> dict[str, Any]:
+def _electrical(plant: Measured, values: dict[str, float]) -> dict[str, Any]:
     """What else makes a line of this order where it is a whole number of periods per electrical turn.
 
     With the current given as i_q, an offset of a phase's sensor is a torque at the electrical frequency, and unequal
@@ -110,7 +110,7 @@ def _key(effects_: dict[str, dict[str, float]], values: dict[str, float]) -> str
     return next(key for key, other in effects_.items() if other == values)
 
 
-def structure(plant: AxisPlant, terms: Sequence[Candidate], point: Point) -> dict[str, Any]:
+def structure(plant: Measured, terms: Sequence[Candidate], point: Point) -> dict[str, Any]:
     """What the unnamed terms look like."""
     out: dict[str, Any] = {"terms": [], "orders": [], "frequencies": [], "depends_on": []}
     unit = "N" if isinstance(plant.plant, LinearAxis) else "N m"

@@ -12,7 +12,7 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 
 if TYPE_CHECKING:
-    from .plant import AxisPlant
+    from .measured import Measured
 
 NAME = "gear_compliance"
 SHARES = (0.35, 0.65)  # of the inertia, behind the gear
@@ -21,7 +21,7 @@ LOWEST, HIGHEST = 3.0, 0.2  # [Hz], and per sample: of the load against a motor 
 DAMPING = 0.1
 
 
-def gear_candidate(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> Candidate | None:
+def gear_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Candidate | None:
     """The likeliest resonance as a start, or None where the record shows no motion that could show one."""
     if any(name.startswith(NAME) for name in point):
         return None

@@ -23,6 +23,7 @@ from .naming import Numbers, numbers_of
 from .noise import ESTIMATE_UNCERTAINTY
 from .pack import Pack
 from .predictable import LONGEST_WINDOW, predictable
+from .screened import screened
 from .undersampled import refuse_undersampled
 from .whitening import Filter, design, open_loop_variance
 from .windows import START_NOISE, Bench, Window, bench, speed_noise
@@ -107,7 +108,7 @@ class AxisPlant:
 
     def candidates(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Library effects with bounds and starts for this axis."""
-        return candidates.library(self, point, blocks)
+        return [*candidates.library(self, point, blocks), *screened(self.balance, self.plant, point)]
 
     def structure(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Terms that the torque residual along the measured motion suggests."""

@@ -15,13 +15,13 @@ from .weak_form import FEWEST, Weak, thinned, weak_form
 from .windows import Bench
 
 if TYPE_CHECKING:
-    from .plant import AxisPlant
+    from .measured import Measured
 
 N_GROWTHS = 3.0  # growth of e^3 in a window
 LONGEST_WINDOW = 0.4  # [s]
 
 
-def predictable(plant: AxisPlant, bench: Bench) -> float:
+def predictable(plant: Measured, bench: Bench) -> float:
     """Length of time over which the motion of a record can be foretold from a start state. [s]
 
     Deviations grow like exp(λ t); after a few of these the start state's noise decides.
@@ -36,7 +36,7 @@ def predictable(plant: AxisPlant, bench: Bench) -> float:
     return float(min(LONGEST_WINDOW, N_GROWTHS / growth)) if growth > 0.0 else LONGEST_WINDOW
 
 
-def _of_lines(plant: AxisPlant, weak: Weak) -> float:
+def _of_lines(plant: Measured, weak: Weak) -> float:
     """λ, λ² = A n / J, beside an angle-locked torque A sin nθ. [1/s]"""
     orders = integer_orders(weak)
     if isinstance(plant.plant, LinearAxis) or len(orders) == 0:
@@ -46,7 +46,7 @@ def _of_lines(plant: AxisPlant, weak: Weak) -> float:
     return float(np.sqrt(stiffness / plant.plant.inertia))
 
 
-def _of_falling_friction(plant: AxisPlant, weak: Weak) -> float:
+def _of_falling_friction(plant: Measured, weak: Weak) -> float:
     """λ = F / (J ω_s) where friction falls by F over a speed ω_s. [1/s]"""
     speeds = SPEEDS * float(np.sqrt(np.mean(weak.motion.w**2)))
     found = fadings(weak, weak.always(), speeds)

@@ -6,18 +6,14 @@ noise may favour.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
-from ema.models.axis_config import LINES
+from ema.models.axis_config import LINES, Axis
 
+from .balance import Balance
 from .balance.as_effects import effects, line_point
-
-if TYPE_CHECKING:
-    from .plant import AxisPlant
 
 SCREENED = (
     *("viscous_by_direction", "pendulum", "output_load_friction", "drive_unequal", "viscous_slope", "friction_slope"),
@@ -28,12 +24,11 @@ ROOM = 10.0  # times the size that the regression found, to which a fit may go
 FIXED = ("centre", "since", "coefficient", "damping")  # parameters that the records of one bench hardly show
 
 
-def screened(plant: AxisPlant, point: Point) -> list[Candidate]:
+def screened(balance: Balance | None, plant: Axis, point: Point) -> list[Candidate]:
     """Candidates for the laws that the balance needs."""
-    balance = plant.balance
     if balance is None:
         return []
-    have = {name.split(".")[0] for name in point} | set(plant.plant.effects)
+    have = {name.split(".")[0] for name in point} | set(plant.effects)
     out = []
     for term in balance.terms:
         for name, values in effects(balance, term).items():

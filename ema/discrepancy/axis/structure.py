@@ -16,11 +16,11 @@ from ema.core.records import Array
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects.torque_term import COLUMNS, EVEN, NEUTRAL
 
-from .candidates import Sizes, sizes
+from .sizes import Sizes, sizes
 from .weak_form import FEWEST, Motion, Weak, thinned, weak_form
 
 if TYPE_CHECKING:
-    from .plant import AxisPlant
+    from .measured import Measured
 
 N_GRID = 300  # members of a family at most
 N_CENTRES = 24
@@ -39,7 +39,7 @@ class Term:
     refine: dict[str, tuple[float, float, float]]  # column → (low, high, scale)
 
 
-def search(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> list[Candidate]:
+def search(plant: Measured, point: Point, blocks: Sequence[int]) -> list[Candidate]:
     """The best member of each family, the one that explains most first."""
     weak = thinned(weak_form(plant, point, blocks))
     if len(weak.y) < FEWEST:
@@ -120,7 +120,7 @@ def _dictionary(m: Motion, s: Sizes, own: float) -> Iterator[Term]:
         yield from _bumps("time", m.t, one, sign)
 
 
-def _own_frequency(plant: AxisPlant) -> float:
+def _own_frequency(plant: Measured) -> float:
     """Frequency of a motion that is little more than one sine, 0 of any other.   [Hz]"""
     moving = [w for w in plant.windows if not w.static]
     if not moving:
@@ -147,7 +147,7 @@ def _bumps(what: str, x: Array, one: Array, sign: Array) -> Iterator[Term]:
             yield Term(f"torque around a {what}", (bump,), values, refine)
 
 
-def _candidate(key: str, term: Term, c: Array, plant: AxisPlant) -> Candidate:
+def _candidate(key: str, term: Term, c: Array, plant: Measured) -> Candidate:
     size = float(np.abs(c).max())
     unit = "N m"
     start = {f"{key}.{name}": value for name, value in zip(COLUMNS, NEUTRAL, strict=True)}

@@ -23,7 +23,7 @@ from ema.models.axis_layout import row
 from .windows import Bench, Window
 
 if TYPE_CHECKING:
-    from .plant import AxisPlant
+    from .measured import Measured
 
 HALF_WIDTHS = (3, 5, 8, 12, 20, 32, 50)  # of a test function, in samples
 FEWEST, MAX_ROWS = 30, 2500  # test functions with which regressions are worth it, and with which they stay quick
@@ -95,7 +95,7 @@ class Weak:
         return Weak(*columns, self.motion, self.index[chosen], self.weight[chosen], self.block[chosen])
 
 
-def weak_form(plant: AxisPlant, point: Point, blocks: Sequence[int]) -> Weak:
+def weak_form(plant: Measured, point: Point, blocks: Sequence[int]) -> Weak:
     """Weak-form residual of the model at `point`."""
     model = plant.model(point)
     zeros = plant.numbers(point).zeros
@@ -161,7 +161,7 @@ def bump(half: int, power: int = 4) -> tuple[Array, Array, Array]:
     return phi, -first / (first @ n), 2.0 * second / (second @ n**2)
 
 
-def _moving(plant: AxisPlant, model: axis.Model, j: int, offset: int, zero: float) -> tuple[Weak, tuple[Array, ...]]:
+def _moving(plant: Measured, model: axis.Model, j: int, offset: int, zero: float) -> tuple[Weak, tuple[Array, ...]]:
     p, w, b = plant.plant, plant.windows[j], plant.bench_of(j)
     z = model.z
     J = z[row("J")] * (1.0 + z[row("inertia.change")])

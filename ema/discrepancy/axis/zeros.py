@@ -7,7 +7,6 @@ lines are z_n exp(i n δ). δ is where they lie over each other.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,36 +15,18 @@ from ema.core.records import Array
 from ema.models.axis_config import LinearAxis
 
 from .cogging import integer_orders, scan
+from .measured import Zero
 from .weak_form import FEWEST, thinned, weak_form
 
 if TYPE_CHECKING:
-    from .plant import AxisPlant
+    from .measured import Measured
 
 SAME = 0.98  # of the best overlap: a zero that reaches it is as good, the smallest is taken
 TURNED = 0.15  # [rad] of a line, within which all lines lie as they do or turned round, where no zero is off
 STEPS = 64  # of δ in one period of the highest order
 
 
-@dataclass(frozen=True)
-class Zero:
-    """Angle to be added to the positions of a record, found by lines of `orders`; None where nothing tells. [rad]
-
-    `turned`: lines that have the other sign in this record while the zero is the same; a zero that is `instead` off
-    would look alike.
-    """
-
-    angle: float | None
-    orders: tuple[float, ...] = ()
-    turned: tuple[float, ...] = ()
-    instead: float = 0.0
-
-    @property
-    def period(self) -> float:
-        """Angle by multiples of which the zero may be another. [rad]"""
-        return 2.0 * math.pi / math.gcd(*(round(n) for n in self.orders))
-
-
-def zeros(plant: AxisPlant) -> dict[str, Zero]:
+def zeros(plant: Measured) -> dict[str, Zero]:
     """By record, beside the first one that shows such a torque; empty for one record or a linear axis."""
     if len(plant.benches) < 2 or isinstance(plant.plant, LinearAxis):
         return {}
@@ -56,7 +37,7 @@ def zeros(plant: AxisPlant) -> dict[str, Zero]:
     return {name: between(lines[first], own) for name, own in lines.items() if name != first}
 
 
-def _lines(plant: AxisPlant, name: str) -> dict[float, complex]:
+def _lines(plant: Measured, name: str) -> dict[float, complex]:
     """z_n by order. [N m]"""
     weak = thinned(weak_form(plant, {}, [j for j, w in enumerate(plant.windows) if w.group == name]))
     orders = integer_orders(weak)

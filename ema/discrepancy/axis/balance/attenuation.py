@@ -24,7 +24,7 @@ from .regression import Plain, Regression, fitted
 from .rows import rows
 
 if TYPE_CHECKING:
-    from ema.discrepancy.axis.plant import AxisPlant
+    from ema.discrepancy.axis.measured import Measured
 
 N_DRAWS = 4
 UNSURE = 0.5  # of the correction, as its standard deviation
@@ -39,7 +39,7 @@ class Corrected:
 
 
 def attenuation(
-    plant: AxisPlant,
+    plant: Measured,
     courses: list[Course],
     halves: dict[str, float],
     plain: Plain,

@@ -23,7 +23,7 @@ from .regression import BY_RECORD, Plain, Regression, fitted
 from .rows import LONGEST, STILL, Rows, half_widths, rows
 
 if TYPE_CHECKING:
-    from ema.discrepancy.axis.plant import AxisPlant
+    from ema.discrepancy.axis.measured import Measured
 
 MOST_LAWS = 8
 CLEAR = 3.0  # deviations over blocks by which a law must foretell held-out blocks better
@@ -103,7 +103,7 @@ class Balance:
         return 1.0 - left / self.drive
 
 
-def balance(plant: AxisPlant) -> Balance | None:
+def balance(plant: Measured) -> Balance | None:
     """The balance of all records; None where no stretch of motion is long enough."""
     p = plant.plant
     plain = Plain(p.inertia, p.F_d, p.C, 1.0 if p.is_force else float(p.k_t or 1.0))
@@ -177,7 +177,7 @@ def unsure_share(model: Regression, plain: Plain, drive: float) -> float:
     return min(STILL * drive / max(abs(F_d), 1e-300), LONG)
 
 
-def _is_given(plant: AxisPlant, recorded: Sequence[Course], found: Rows) -> bool:
+def _is_given(plant: Measured, recorded: Sequence[Course], found: Rows) -> bool:
     """Whether the drive's torque is no measurement: by a constant voltage it is a function of speed, whatever acts."""
     if plant.plant.drive != "voltage" or any(c.current is not None for c in recorded):
         return False

@@ -12,7 +12,7 @@ from ema.discrepancy.axis.windows import Bench
 from ema.effects.base import T_REFERENCE
 
 if TYPE_CHECKING:
-    from ema.discrepancy.axis.plant import AxisPlant
+    from ema.discrepancy.axis.measured import Measured
 
 LATE = {"held": 0.5, "held before": -0.5}  # samples, by what the drive does between them
 MOST = 60_000  # samples of all cycles together; of longer ones means of neighbours are taken
@@ -68,7 +68,7 @@ class Course:
         )
 
 
-def courses(plant: AxisPlant) -> list[Course]:
+def courses(plant: Measured) -> list[Course]:
     """Every cycle of every record."""
     n = sum(cycle.n_samples for record in plant.records for cycle in record)
     every = max(1, -(-n // MOST))

@@ -19,10 +19,10 @@ from .regression import Plain, fitted
 from .rows import rows
 
 if TYPE_CHECKING:
-    from ema.discrepancy.axis.plant import AxisPlant
+    from ema.discrepancy.axis.measured import Measured
 
 
-def with_zeros(plant: AxisPlant, recorded: Sequence[Course], plain: Plain) -> list[Course]:
+def with_zeros(plant: Measured, recorded: Sequence[Course], plain: Plain) -> list[Course]:
     """The courses with what is to be added to their angles."""
     moved = {name: zero.orders for name, zero in plant.zeros.items() if zero.angle}
     raw = rows(plant, list(recorded)) if moved else None

@@ -22,7 +22,7 @@ from .course import Course
 from .smooth import bumps_at, local_polynomial
 
 if TYPE_CHECKING:
-    from ema.discrepancy.axis.plant import AxisPlant
+    from ema.discrepancy.axis.measured import Measured
 
     from .law import Acting, Law
 
@@ -121,7 +121,7 @@ class Rows:
 
 
 def rows(
-    plant: AxisPlant, courses: list[Course], halves: dict[str, float] | None = None, unsure: float = 0.0
+    plant: Measured, courses: list[Course], halves: dict[str, float] | None = None, unsure: float = 0.0
 ) -> Rows | None:
     """Rows of all courses; None where there are too few to say anything. `halves`: half widths by record. [s]
 
@@ -214,7 +214,7 @@ def _alpha(c: Course, index: NDArray[np.int_], first: Array, second: Array) -> t
 
 
 def _weak(
-    plant: AxisPlant, c: Course, m: Motion, half: float, thin: float, unsure: float
+    plant: Measured, c: Course, m: Motion, half: float, thin: float, unsure: float
 ) -> tuple[csr_array, csr_array, Array, NDArray[np.int_], Array]:
     step = max(1, round(0.5 * thin * half / c.period))
     centres = np.arange(0, len(c.t), step)
@@ -236,7 +236,7 @@ def _weak(
     return (*weights, alpha[good], centres, sigma)
 
 
-def _per_drive(plant: AxisPlant, c: Course) -> float:
+def _per_drive(plant: Measured, c: Course) -> float:
     """Torque per unit of the drive channel."""
     p, kind = plant.plant, c.bench.roles.kind
     k_t = 1.0 if kind == "force" else float(p.k_t or 1.0)
@@ -245,7 +245,7 @@ def _per_drive(plant: AxisPlant, c: Course) -> float:
     return k_t * (p.loop.K_w if p.loop and kind == "speed-loop" else 1.0)
 
 
-def _motion(plant: AxisPlant, model: axis.Model, c: Course, half: float) -> Motion:
+def _motion(plant: Measured, model: axis.Model, c: Course, half: float) -> Motion:
     n_half = max(3, round(half / c.period))
     if c.position is not None:
         theta, w, a = local_polynomial(c.t, c.position, n_half, 3)[:3]
@@ -269,7 +269,7 @@ def _motion(plant: AxisPlant, model: axis.Model, c: Course, half: float) -> Moti
     return replace(motion, other=(psi, v, accelerates), neighbour=plant.plant.neighbour)
 
 
-def _at_rest(plant: AxisPlant, model: axis.Model, c: Course) -> Motion:
+def _at_rest(plant: Measured, model: axis.Model, c: Course) -> Motion:
     assert c.position is not None
     assert c.direction is not None
     k_t = float(plant.plant.k_t or 1.0)
