@@ -34,7 +34,7 @@ from ema.discrepancy.engine.weighing import Budget
 from ema.discrepancy.progress import Progress
 from ema.models.actuator import Actuator
 
-BUDGET = Budget(records=48, width=3, rounds=3, at_most=2, turns=3)  # some minutes of a core
+BUDGET = Budget(records=16, column_seeds=4, fit_seeds=8, width=3, rounds=2, at_most=2, turns=3)
 FOLDER = Path(__file__).resolve().parents[1] / "tests" / "data" / "foreign_actuator"
 
 

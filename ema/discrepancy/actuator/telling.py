@@ -25,7 +25,6 @@ from .search import CHANCE, FINAL_SEED, N_FINAL, Model, Search
 from .structure import structure
 from .weighing import WORTH_IT, is_enough
 
-IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
 NAMED = 0.95  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
 UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: a rest is left that nothing explains
 IN_LIBRARY = 0.99  # probability that what does it is in the library at all, where it leaves nothing
@@ -177,7 +176,7 @@ def _found(
         if name in bounds:
             value, own = sizes[name]
             differing = model.fit.sd[name] if search.plant.data.faults.any() else 0.0  # faults of each cycle
-            sd = float(np.linalg.norm([max(own, differing), IMPLEMENTATION * value, e.least_sd.get(p.name, 0.0)]))
+            sd = float(np.linalg.norm([max(own, differing), e.least_sd.get(p.name, 0.0)]))
             f = bounds[name]
             values[p.name] = value
             parameters[p.name] = Quantity(value, max(value - 1.96 * sd, f.low), min(value + 1.96 * sd, f.high), p.unit)

@@ -100,10 +100,10 @@ class Search:
         """Fit a set from where a move begins, simulate it, and keep it where it is the best of its set."""
         parameters = self.scale.parameters(move.causes)
         low, high, steps = (np.array([getattr(p, of) for p in parameters]) for of in ("low", "high", "step"))
-        residuals = self.scale.residuals(parameters)
         known = np.pad(self.scale.scan_columns(parameters), ((0, 1), (0, 0)))
         responses = self.scale.responses(parameters)
         starts = self._starts(move, parameters)
+        residuals = self.scale.residuals_from(starts[0], parameters)
         for fit in best_of(residuals, starts, low, high, steps, self.budget.turns, known, responses):
             point = {p.name: float(x) for p, x in zip(parameters, fit.x, strict=True)}
             made = self.scale.weigh(Hypothesis(move.causes, point), fit.columns[: self.scale.d])

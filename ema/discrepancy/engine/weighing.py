@@ -86,7 +86,8 @@ class Scale:
         self.whitening = Whitening.of(white, problem.blocks, problem.floors)
         everything = [*problem.faults, *(p for c in problem.causes for p in c.parameters)]
         J = self.whitening.white(self._differences(point, everything))
-        self.statistic = Statistic.of(self.whitening, J.T, budget.records)
+        freedom = (budget.records - problem.grids) * len(problem.blocks)
+        self.statistic = Statistic.of(self.whitening, J.T, freedom)
         self.scanned = {p.name: self.statistic.basis.T @ row for p, row in zip(everything, J, strict=True)}
         self.law_error = LawError(np.zeros((self.d, self.d)), 0.0, 0.0)
 
@@ -128,6 +129,12 @@ class Scale:
             return np.concatenate([t, np.sqrt(rest)[:, None]], axis=1)
 
         return at
+
+    def residuals_from(self, start: Array, parameters: Sequence[Parameter]) -> Callable[[Array], Array]:
+        """The same at points near a start: simulated there, and elsewhere by how points differ, which costs less."""
+        here = self.residuals(parameters)(start[None])[0]
+        between = self.responses(parameters)
+        return lambda x: here - between(start, x)
 
     def responses(self, parameters: Sequence[Parameter]) -> Callable[[Array, Array], Array]:
         """How the statistics of simulated points (n, p) differ from those of one (p,); of the rest nothing is told."""

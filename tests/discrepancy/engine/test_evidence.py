@@ -110,3 +110,11 @@ def test_no_probability_is_surer_than_the_evidence():
     assert sure == pytest.approx(1.0 / (1.0 + np.exp(-6.0)))
     assert posterior(two, 6.0)[0].probability == pytest.approx(stats.norm.cdf(0.5**0.5), abs=0.02)
     assert posterior(two, 100.0)[0].probability < 0.6
+
+
+def test_a_rest_smaller_than_records_have_is_no_evidence_against():
+    """What honest simulations may differ by is in every simulated record, and need not be in the measured one."""
+    less, likeliest, more = (Prediction(np.zeros(1), np.eye(1), rest, 10.0, 20.0, 96) for rest in (4.0, 8.0, 20.0))
+    assert less.log_rest(0.0) == pytest.approx(likeliest.log_rest(0.0))
+    assert more.log_rest(0.0) < likeliest.log_rest(0.0) - 2.0
+    assert more.log_rest(10.0) > more.log_rest(0.0)  # a law of another form may leave it
