@@ -17,8 +17,8 @@ import click
 import hidden_actuator as hidden
 import hidden_cases as cases
 import numpy as np
-from scipy.stats import beta
 
+from benchmarks.frozen_table import rate
 from ema.core import config, resources
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
@@ -82,11 +82,6 @@ def _told(row: dict[str, Any]) -> str:
     return "unseen" if unseen else str(row["outcome"])
 
 
-def _rate(count: int, n: int) -> str:
-    low, high = (float(x) for x in beta.interval(0.95, count + 0.5, n - count + 0.5))
-    return f"{count} of {n} ({low:.1%} to {high:.1%})"
-
-
 def _err_k(found: list[float], truth: list[float]) -> float:
     return float(np.linalg.norm(np.array(found) - truth) / np.sqrt(6.0))
 
@@ -101,9 +96,9 @@ def _rates(hiding: list[dict[str, Any]], kind: str) -> list[str]:
     known = [row for row in hiding if row["outcome"] == "right" and not cases.case(row["case"]).outside]
     close = sum(row["err_after"] <= 1.2 * row["noise_floor"] for row in known)
     return [
-        f"{kind}right or in the set: {_rate(good, len(hiding))}; confidently wrong: {_rate(bad, len(hiding))}",
-        f"{kind}95 % intervals of parameters that hold the truth: {_rate(sum(inside), len(inside))}",
-        f"{kind}held-out err_i within 1.2 noise floors where named right: {_rate(close, len(known))}",
+        f"{kind}right or in the set: {rate(good, len(hiding))}; confidently wrong: {rate(bad, len(hiding))}",
+        f"{kind}95 % intervals of parameters that hold the truth: {rate(sum(inside), len(inside))}",
+        f"{kind}held-out err_i within 1.2 noise floors where named right: {rate(close, len(known))}",
     ]
 
 
@@ -133,7 +128,7 @@ def table(rows: list[dict[str, Any]]) -> str:
     lines.append(f"processor time of a trial: median {np.median(cpu):.0f} s, largest {max(cpu):.0f} s")
     if alarms:
         lines.append(
-            f"false alarms without an effect: {_rate(sum(row['verdict'] != 'adequate' for row in alarms), len(alarms))}"
+            f"false alarms without an effect: {rate(sum(row['verdict'] != 'adequate' for row in alarms), len(alarms))}"
         )
     lines += [f"refused: {row['case']} {row['seed']}: {row['said'][0]}" for row in refused]
     return "\n".join(lines)
