@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -116,12 +117,22 @@ def test_a_worker_that_is_not_there_and_then_is(tmp_path, connect, coarse_bundle
         server = Server(tmp_path / "socket", {0: coarse_bundle})
         thread = threading.Thread(target=server.run, args=(stop,))
         thread.start()
-        try:
-            remote.run(job)
-        except WireError:  # the connection to the one before
-            assert remote.run(job).method == "lf2"
+        assert remote.run(job).method == "lf2"
         stop.set()
         thread.join(10)
+
+
+def test_a_process_that_takes_connections_and_never_answers_gives_no_sign_of_life(tmp_path, connect):
+    with socket.socket(socket.AF_UNIX) as stopped:
+        stopped.bind(str(tmp_path / "socket"))
+        stopped.listen()
+        remote = connect(tmp_path / "socket")
+        assert remote.answers()
+        remote.watch()
+        end = time.monotonic() + 30
+        while remote.answers() and time.monotonic() < end:
+            time.sleep(0.05)
+        assert not remote.answers()
 
 
 def test_a_socket_somebody_listens_on_is_not_taken(served, coarse_bundle):

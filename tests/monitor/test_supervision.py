@@ -59,6 +59,12 @@ def test_the_cause_is_told_and_not_its_consequences(table):
     assert table.lapsed == {SILENT}
 
 
+def test_what_a_cause_explains_from_now_on_is_not_over(table):
+    assert run(table, 3.0, SILENT) == [(2.25, Lapse.NO_CYCLES, True)]
+    assert run(table, 10.0, start=3.25) == [(4.25, Lapse.SILENT, True)]
+    assert table.lapsed == {SILENT}
+
+
 def test_what_rested_on_it_has_its_deadline_again_when_it_is_back(table):
     run(table, 10.0)
     assert run(table, 12.0, SILENT, start=10.25) == [(10.25, Lapse.SILENT, False)]

@@ -61,9 +61,11 @@ def install():
 def start():
     say("the daemon starts by itself with the interface; the simulator is started")
     wait_until_running()
+    wait("the alarm of a silent actuator is in the journal", alarms_in_the_journal)
     listen()
     run("systemctl", "start", SIMULATOR)
     facts["first_estimates"] = wait_for_estimates()
+    facts["alarms"] = alarms_in_the_journal()
     facts["started"] = {**show("NRestarts", "MainPID", "MemoryCurrent", "User"), "status": status_of_main_process()}
 
 
@@ -167,6 +169,12 @@ def executable():
 
 def journal():
     return run("journalctl", "--no-pager", "-u", DAEMON, check=False)
+
+
+def alarms_in_the_journal():
+    """What the journal holds of alarms, found as a tool would: by the message id."""
+    found = run("journalctl", f"MESSAGE_ID={(JOB / 'message_id').read_text()}", "-o", "json", check=False)
+    return [json.loads(line) for line in found.splitlines() if line.startswith("{")]
 
 
 def listen():

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ema_daemon.alarming import MESSAGE_ID
 
 from ema.bus.codec import default
 from ema.core import frames as fr
@@ -47,6 +48,7 @@ def machine(request, coarse_bundle, tmp_path_factory):
     (job / "scenario.yaml").write_text(SCENARIO_YAML)
     ids = {method: default().messages[f"Estimate{method.capitalize()}"].frame_id for method in ("linear", "hf")}
     (job / "ids.json").write_text(json.dumps({method: f"{identifier:08X}" for method, identifier in ids.items()}))
+    (job / "message_id").write_text(MESSAGE_ID)
     (job / "at-shutdown").write_text(AT_SHUTDOWN)
     (job / "at-shutdown").chmod(0o755)
     pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
@@ -101,6 +103,13 @@ def test_daemon_runs_confined(facts, capsys):
 
 def test_estimates_reach_the_bus(facts):
     assert facts["first_estimates"] >= 2
+
+
+def test_alarms_are_found_in_the_journal_by_their_message_id_with_fields_of_their_own(facts):
+    names = ("EMA_ACTUATOR", "EMA_CAUSE", "EMA_LEVEL", "EMA_STATE", "_SYSTEMD_UNIT")
+    found = [tuple(line[name] for name in names) for line in facts["alarms"] if line["EMA_CAUSE"] == "silent"]
+    assert found[0] == ("0", "silent", "alarm", "active", "ema-daemon@vcan0.service")
+    assert {line["MESSAGE"].split(":")[0] for line in facts["alarms"]} == {"actuator 0"}
 
 
 def test_hf_worker_answers_over_its_socket(facts):
