@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -30,3 +32,14 @@ def test_runs_scatter_by_what_the_start_may_be_off(coarse_bundle):
     print((shift / here.std(axis=0)).max(), (shift / exact.std(axis=0)).max())
     assert (shift / exact.std(axis=0)).max() > 4.0
     assert (shift / here.std(axis=0)).max() < 3.2
+
+
+@pytest.mark.parametrize("method", ["linear", "lf2"])
+def test_identifiers_without_runs_are_widened_where_the_start_moves_the_envelope(coarse_bundle, method):
+    noise, start = coarse_bundle.noise(method), np.zeros(2)
+    exact = replace(noise, start_sd=np.zeros(2))
+    wider = np.diag(noise.covariance(start, WORN) - exact.covariance(start, WORN))
+    print(method, np.sqrt(wider / np.diag(noise.switching)).round(2))
+    assert (wider >= 0.0).all()
+    assert np.sqrt(wider / np.diag(noise.switching)).max() > 0.5
+    assert np.argmax(wider) < len(wider) // 3  # the first reversals
