@@ -73,7 +73,8 @@ def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.Found
         low, high = np.percentile(spread, INTERVAL)
         parameters[key] = shared.Quantity(value, float(low), float(high), units[key])
     others = tuple(sorted({*term.alike, *term.law.also}))
-    confidence = round(b.confidence(term) / (1 + len(term.law.also)), 4)
+    of_set = b.confidence(term) * (1.0 + sum(term.alike.values()) / max(term.wins, 1e-300))
+    confidence = round(min(of_set, 1.0) / (1 + len(others)), 4)  # those in a set share what is sure of it
     return shared.FoundEffect(
         name, confidence, others, parameters, said(effect.said(values)) + ALONE, effect.separated_by
     )  # fmt: skip
