@@ -10,6 +10,7 @@ import pytest
 from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.balance import balance
 from ema.discrepancy.axis.balance.as_effects import point
+from ema.discrepancy.axis.balance.laws import laws
 from ema.discrepancy.axis.balance.telling import told
 from ema.discrepancy.axis.between import examined
 from ema.discrepancy.axis.plant import AxisPlant
@@ -135,3 +136,19 @@ def test_a_torque_channel_that_reads_too_much_is_named_or_in_a_set_where_inertia
     assert found["name"] == "drive_gain"
     assert len(found["indistinguishable_from"]) <= 1
     assert found["parameters"]["gain"]["value"] == pytest.approx(0.15, abs=0.005)
+
+
+def test_each_window_has_the_temperature_of_its_own_time(geared):
+    windows = plant_of(geared, warms=WARM_UP, temperature=True, seconds=6.0).windows
+    dT = np.array([w.dT for w in windows])
+    expected = [2.0 + 36.0 * (1.0 - np.exp(-w.t.mean() / 4.0)) for w in windows]
+    np.testing.assert_allclose(dT, expected, atol=0.5)
+
+
+def test_without_a_load_there_is_nothing_that_friction_by_load_could_grow_with(geared):
+    """What rounding leaves of a load is none: scaled up, it had been a law with a share of 1e16."""
+    model = balance(plant_of(geared, seconds=6.0)).model
+    m = model.rows.motion
+    (held,) = (law for law in laws(m, linear=False) if law.key == "friction by held")
+    (column,) = held.columns(m, model.acting)
+    assert not column.any()
