@@ -335,8 +335,13 @@ def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequenc
     """How sure a law is beside all that could stand in its place."""
     without = fitted(found, plain, [own for own in model.laws if own.key != law.key])
     others = [r for r in _trials(found, plain, without, every) if r.laws[-1].key != law.key]
+    siblings: dict[str, list[Law]] = {}
+    for other in every:
+        if other.family == law.family and other.name != law.name:
+            siblings.setdefault(other.name, []).append(other)
+    same = [fitted(found, plain, _with(without, _best(found, without, own))) for own in siblings.values()]
     rivals: dict[str, Array] = {}
-    for r in others:
+    for r in [*others, *same]:
         own = r.laws[-1].name.removesuffix(BY_NAME)
         if law.family in _held(r.laws[-1].family) and not _is_needed(r, model, 0.0):
             continue  # it can do what this law does and more, and need not
