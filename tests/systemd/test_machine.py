@@ -109,7 +109,7 @@ def test_alarms_are_found_in_the_journal_by_their_message_id_with_fields_of_thei
     names = ("EMA_ACTUATOR", "EMA_CAUSE", "EMA_LEVEL", "EMA_STATE", "_SYSTEMD_UNIT")
     found = [tuple(line[name] for name in names) for line in facts["alarms"] if line["EMA_CAUSE"] == "silent"]
     assert found[0] == ("0", "silent", "alarm", "active", "ema-daemon@vcan0.service")
-    assert {line["MESSAGE"].split(":")[0] for line in facts["alarms"]} == {"actuator 0"}
+    assert all(line["MESSAGE"].startswith("actuator 0: ") for line in facts["alarms"] if "EMA_ACTUATOR" in line)
 
 
 def test_hf_worker_answers_over_its_socket(facts):
