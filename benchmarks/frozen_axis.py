@@ -41,7 +41,8 @@ def trial(t: strata_axis.Trial, threads: int) -> dict[str, Any]:
     except RecordError as error:
         return {**told, "outcome": "refused", "said": [str(error)]}
     said = found.as_dict()
-    quantities = {f"{e.name}.{name}": q for e in found.effects for name, q in e.parameters.items()}
+    # of two lines of cogging the first, larger one is the one whose amplitude is told in the truth
+    quantities = {f"{e.name}.{name}": q for e in reversed(found.effects) for name, q in e.parameters.items()}
     true = {name: x for name, x in t.truth.items() if name in quantities and name in strata_axis.EXACT}
     sd = {name: (quantities[name].high - quantities[name].low) / 3.92 for name in true}
     return {
