@@ -17,8 +17,13 @@ def table_of(path: Path) -> Table:
     """The table in a file of any kind that has columns; RecordError in one line."""
     from ema.core import binary_tables, sidecar
     from ema.core.errors import RecordError
+    from ema.core.files import require_file
     from ema.core.text_table import read_text
 
+    try:
+        require_file(path)
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be read ({error.strerror})") from error
     suffix = path.suffix.lower()
     if suffix == ".mcap":
         raise RecordError(f"{path}: is a log, its channels have names already; see 'ema records check {path}'")

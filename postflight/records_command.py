@@ -86,15 +86,14 @@ def map_columns(file: Path, write: bool) -> None:
     """
     from ema.core import sidecar
     from ema.core.errors import ConfigError, NegativeAnswer
-    from ema.core.files import require_file
     from ema.discrepancy.records.naming import propose
 
     from .proposed_sidecar import as_sidecar, table_of
 
+    proposals = propose(table_of(file))
     beside = sidecar.beside(file)
     if write and beside.exists():
         raise ConfigError(f"{beside}: exists, and is not overwritten; see it, or move it away")
-    proposals = propose(table_of(require_file(file)))
     text = as_sidecar(file.name, proposals)
     if not any(one.channel == "t" for one in proposals):
         click.echo(text, nl=False)

@@ -93,3 +93,11 @@ def test_a_file_without_a_known_time_names_the_command(tmp_path):
     path, _ = mapped(tmp_path, "Time [ms],Position [mm],Force [N]")
     with pytest.raises(RecordError, match=f"'ema records map {path}' proposes"):
         CliRunner().invoke(cli, ["records", "check", str(path)], catch_exceptions=False)
+
+
+@pytest.mark.parametrize(
+    ("path", "said"), [("nosuch.csv", "No such file"), (".", "a folder"), ("/dev/zero", "a device")]
+)
+def test_what_is_no_file_is_refused_in_one_line(path, said):
+    with pytest.raises(RecordError, match=f"cannot be read .*{said}"):
+        CliRunner().invoke(cli, ["records", "map", path], catch_exceptions=False)
