@@ -9,16 +9,14 @@ answer is appended to the log as one line of JSON; a log is continued, and print
 
 from __future__ import annotations
 
-import argparse
-import json
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import geared
 import numpy as np
 
+from benchmarks import resumed
 from ema.core.version import version
 from ema.discrepancy.axis.balance.telling import told
 from ema.discrepancy.axis.plant import AxisPlant
@@ -102,23 +100,10 @@ def table_of(rows: list[dict[str, Any]]) -> str:
 
 def main() -> None:
     """Run what is missing, and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trials", type=int, default=10 * len(HIDDEN))
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--log", type=Path, default=Path("var/laws_axis.jsonl"))
-    args = parser.parse_args()
-    rows = [json.loads(line) for line in args.log.read_text().splitlines()] if args.log.exists() else []
-    rows = [row for row in rows if row["seed"] == args.seed]
-    done = {row["number"] for row in rows}
-    args.log.parent.mkdir(parents=True, exist_ok=True)
-    print(f"seed {args.seed}")
-    for number in range(args.trials):
-        if number not in done:
-            rows.append(look(args.seed, number))
-            with args.log.open("a") as log:
-                log.write(json.dumps(rows[-1]) + "\n")
-            print(number, rows[-1]["hidden"], rated(rows[-1]), rows[-1]["said"], flush=True)
-    print(table_of(rows))
+    resumed.run(
+        __doc__, "var/laws_axis.jsonl", 10 * len(HIDDEN), look,
+        lambda row: f"{row['hidden']} {rated(row)} {row['said']}", table_of,
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

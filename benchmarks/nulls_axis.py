@@ -9,12 +9,9 @@ examined is appended to the log as one line of JSON; a log is continued, and pri
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import geared
@@ -22,6 +19,7 @@ import numpy as np
 import positioner
 from scipy import stats
 
+from benchmarks import resumed
 from ema.core.records import Record
 from ema.core.version import version
 from ema.discrepancy.axis.between import examined
@@ -92,23 +90,10 @@ def look(seed: int, number: int) -> dict[str, Any]:
 
 def main() -> None:
     """Run what is missing, and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trials", type=int, default=102)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--log", type=Path, default=Path("var/nulls_axis.jsonl"))
-    args = parser.parse_args()
-    rows = [json.loads(line) for line in args.log.read_text().splitlines()] if args.log.exists() else []
-    rows = [row for row in rows if row["seed"] == args.seed]
-    done = {row["number"] for row in rows}
-    args.log.parent.mkdir(parents=True, exist_ok=True)
-    print(f"seed {args.seed}")
-    for number in range(args.trials):
-        if number not in done:
-            rows.append(look(args.seed, number))
-            with args.log.open("a") as log:
-                log.write(json.dumps(rows[-1]) + "\n")
-            print(number, rows[-1]["plant"], rows[-1]["verdict"], rows[-1]["effects"], rows[-1]["balance"], flush=True)
-    print(table_of(rows))
+    resumed.run(
+        __doc__, "var/nulls_axis.jsonl", 102, look,
+        lambda row: f"{row['plant']} {row['verdict']} {row['effects']} {row['balance']}", table_of,
+    )  # fmt: skip
 
 
 def table_of(rows: list[dict[str, Any]]) -> str:
