@@ -137,13 +137,10 @@ def _examined(
         findings.notes.extend(notes)
         findings.write(findings_file)
         write_extended(plant_file, [*findings.effects, *findings.unnamed], extended, findings.fitted)
+        # Before the pictures, so that no moment of an interruption leaves findings without their report.
+        write_report(report, name, records, findings, [])
         say("pictures")
-        try:
-            pictures = draw()
-        except KeyboardInterrupt:
-            write_report(report, name, records, findings, [])
-            raise
-        write_report(report, name, records, findings, pictures)
+        write_report(report, name, records, findings, draw())
     return findings
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,7 +45,7 @@ def picture(title: str, caption: str, figure: Figure) -> Picture:
 def write_report(
     path: Path, plant_name: str, records: Sequence[str], findings: Findings, pictures: Sequence[Picture]
 ) -> None:
-    """Write the report."""
+    """Write the report, in place of an earlier one at `path`; interrupted, the earlier one stays whole."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("ema.discrepancy", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
@@ -58,4 +59,9 @@ def write_report(
         software=version(),
         css=pages.style(),
     )
-    path.write_text(pages.with_scrolling_tables(html), encoding="utf-8")
+    unfinished = path.with_name(f".{path.name}")
+    try:
+        unfinished.write_text(pages.with_scrolling_tables(html), encoding="utf-8")
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
