@@ -18,7 +18,7 @@ from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
 from .balance.as_effects import effects
-from .balance.choice import Balance, Term
+from .balance.found import Balance, Term
 from .balance.telling import INTERVAL, drawn
 from .linear import in_metres
 

@@ -8,16 +8,22 @@ What the laws explain of the drive's torque is told whatever the free runs say.
 =============  ==========================================================================================
 `course`       each cycle as it was recorded: time stamps as they are, position, speed, drive's torque
 `smooth`       local polynomials, and test functions, on irregular time stamps
-`rows`         the balance integrated against test functions, in blocks, with its noise
+`motion`       angle, speed, acceleration and torque along the courses, as laws see them
 `law`, `laws`  what may act: columns of the regression with their names, units and sentences
+`along`        laws by position
 `links`        the law of a neighbouring axis
+`widths`       how wide test functions must be
+`rows`         the balance integrated against test functions, in blocks, with its noise
 `regression`   least squares with held-out blocks and intervals that blocks agree on
 `attenuation`  errors in the regressors: what noise takes from each coefficient, undone
 `choice`       which laws the records need, and what cannot be told from each
+`found`        the answer: laws, how sure each is, what is left
+`of_records`   all of it on the records of an axis
 `telling`      the balance in words and numbers, and as causes beside those of the free runs
 =============  ==========================================================================================
 """
 
-from .choice import Balance, balance
+from .found import Balance
+from .of_records import balance
 
 __all__ = ["Balance", "balance"]

@@ -14,8 +14,8 @@ import numpy as np
 from ema.core.records import Array
 
 from .law import Acting, Law
+from .motion import Motion
 from .regression import BY_RECORD
-from .rows import Motion
 
 DIFFERS = {  # what may be another in each record without contradicting a cause, and why
     "inertia": "another load on the axis",

@@ -11,7 +11,7 @@ from ema.discrepancy.axis.naming import line
 from ema.discrepancy.plant import Point
 from ema.models.axis_config import LINES
 
-from .choice import Balance, Term
+from .found import Balance, Term
 
 Effects = dict[str, dict[str, float]]
 Values = Mapping[str, float]

@@ -9,7 +9,7 @@ import numpy as np
 from ema.core.records import Array
 
 from .law import Columns, Law, one
-from .rows import Motion
+from .motion import Motion
 
 WARMED = 5.0  # [K] of temperature that records must cover
 LOST = tuple(np.geomspace(0.003, 0.06, 8).tolist())  # [1/K]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ema.core.records import Array
 
-from .rows import Motion
+from .motion import Motion
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ import numpy as np
 from ema.core.records import Array
 
 from .law import Acting, Columns, Law
-from .rows import Motion
+from .motion import Motion
 
 LINKS = "links"
 

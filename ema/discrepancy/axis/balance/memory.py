@@ -12,7 +12,7 @@ from ema.core.records import Array
 from ema.effects.friction_memory import built_up
 
 from .law import Columns, Law, one
-from .rows import Motion
+from .motion import Motion
 
 WAYS = tuple(np.geomspace(0.004, 0.5, 12).tolist())  # of the way between two reversals
 GAP = 5.0  # median samples without a reading after which nothing is known of the bristles

@@ -15,55 +15,20 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
 from ema.core.records import Array
-from ema.models import axis
-from ema.models.axis_layout import row
 
 from .course import Course
-from .smooth import bumps_at, local_polynomial
+from .law import Acting, Law
+from .motion import Motion, at_rest, joined, moving
+from .smooth import bumps_at
+from .widths import acceleration, half_widths
 
 if TYPE_CHECKING:
     from ema.discrepancy.axis.measured import Measured
 
-    from .law import Acting, Law
-
-HALVES = (4, 6, 9, 13, 20, 30, 45, 70, 100, 150, 220, 330)  # of a test function, in samples
-QUIET = 0.1  # noise of the acceleration over its rms from which a test function is wide enough
-STILL = 0.02  # noise of the torque that the inertia needs, over the drive's, from which it is
 MAX_ROWS = 3000
-LONGEST = 20.0  # test functions that a record has room for, at least
 FEWEST = 40  # rows from which a regression is worth it
 N_BLOCKS = 64  # the records are cut into about so many
 N_FOLDS = 4  # interleaved: each holds out every fourth block
-CREEP = 0.02  # of the rms speed: below, friction at rest and in sliding mix
-SEEN = 3.0  # deviations of the smoothed speed that show a direction
-
-
-@dataclass(frozen=True)
-class Motion:
-    """The samples of all courses in one row: arrays of shape (n_samples,).
-
-    `drive` is the drive's torque; `known` what is left of it to accelerate the axis, by the plant file.
-    `direction` is ±1 or, where the axis may rest, 0. `has_position` is False where the position was integrated.
-    `dT` is the winding's temperature less 20 °C [K]; `gear_orders` are those at which a gear may err, per turn.
-    `other` is angle, speed and acceleration of a neighbouring axis, which is the `neighbour` "inner" or "outer" one.
-    `record` is which of `records` a sample is of.
-    """
-
-    t: Array
-    theta: Array
-    w: Array
-    a: Array
-    drive: Array
-    known: Array
-    direction: Array
-    has_position: bool
-    static: NDArray[np.bool_]
-    other: tuple[Array, Array, Array] = (np.empty(0), np.empty(0), np.empty(0))
-    neighbour: str = ""
-    record: NDArray[np.int_] = field(default_factory=lambda: np.empty(0, int))
-    records: tuple[str, ...] = ()
-    dT: Array = field(default_factory=lambda: np.empty(0))
-    gear_orders: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -138,7 +103,7 @@ def rows(
     model = plant.model({})
     motions, pieces, matrices, derivatives, offset, block = [], [], [], [], 0, 0
     for c in courses:
-        motion = _at_rest(plant, model, c) if c.static else _motion(plant, model, c, widths[c.record])
+        motion = at_rest(plant, model, c) if c.static else moving(plant, model, c, widths[c.record])
         motions.append(motion)
         n = len(c.t)
         if c.static:
@@ -164,53 +129,11 @@ def rows(
         return None
     join = _stacked(matrices, offset)
     of_record = np.repeat([names.index(c.record) for c in courses], [len(c.t) for c in courses])
-    motion = replace(_joined(motions), record=of_record, records=tuple(names))
+    motion = replace(joined(motions), record=of_record, records=tuple(names))
     _, own = np.unique(own, return_inverse=True)
     half = float(np.median(list(widths.values()))) if widths else 0.0
     known, drive, slopes = join @ motion.known, join @ motion.drive, _stacked(derivatives, offset)
     return Rows(motion, known, drive, alpha, join, slopes, own, whole, record, sigma, half)
-
-
-def half_widths(courses: list[Course], inertia: float = 0.0, drive: float = 0.0) -> dict[str, float]:
-    """By record, the narrowest test function over which the acceleration is clearly seen. [s]
-
-    With the rms of the drive's torque, and the inertia, also the torque that it needs.
-    """
-    out: dict[str, float] = {}
-    for record in dict.fromkeys(c.record for c in courses if not c.static):
-        own = [c for c in courses if c.record == record]
-        period = float(np.median([c.period for c in own]))
-        longest = max(float(np.ptp(c.t)) for c in own)
-        for half in HALVES:
-            out[record] = (half + 0.5) * period
-            found, noise = zip(*(_acceleration(c, out[record]) for c in own), strict=True)
-            seen, noise_ = (float(np.mean(np.concatenate(x) ** 2)) for x in (found, noise))
-            if noise_ < QUIET**2 * seen and inertia**2 * noise_ <= (STILL * drive) ** 2:
-                break
-            if LONGEST * out[record] > longest:
-                break
-    return out
-
-
-def _acceleration(c: Course, half: float) -> tuple[Array, Array]:
-    """∫ φ dω/dt and its noise, at about a hundred places."""
-    step = max(1, len(c.t) // 100)
-    index, _, first, second, whole = bumps_at(c.t, np.arange(0, len(c.t), step), half)
-    value, noise = _alpha(c, index, first, second)
-    return value[whole], noise[whole]
-
-
-def _alpha(c: Course, index: NDArray[np.int_], first: Array, second: Array) -> tuple[Array, Array]:
-    """Acceleration from the position or, where that is quieter by far, from the speed; and its noise."""
-    out = []
-    for x, weights, role in ((c.position, second, "position"), (c.speed, first, "speed")):
-        if x is not None:
-            noise = c.noise.get(role, 0.0) * np.sqrt((weights**2).sum(axis=1))
-            centre = x[index[:, :1]]  # sums of large numbers lose digits
-            out.append((((x[index] - centre) * weights).sum(axis=1), noise))
-    if len(out) == 2 and np.median(out[1][1]) > 0.2 * np.median(out[0][1]):
-        return out[0]  # the position is what the axis did; a drive's speed is often late
-    return out[-1]
 
 
 def _weak(
@@ -219,7 +142,7 @@ def _weak(
     step = max(1, round(0.5 * thin * half / c.period))
     centres = np.arange(0, len(c.t), step)
     index, phi, first, second, whole = bumps_at(c.t, centres, half)
-    alpha, noise = _alpha(c, index, first, second)
+    alpha, noise = acceleration(c, index, first, second)
     used = phi > 0.0
     direction = m.direction[index]
     one_way = (np.where(used, direction, 1.0) > 0.0).all(axis=1) | (np.where(used, direction, -1.0) < 0.0).all(axis=1)
@@ -245,59 +168,6 @@ def _per_drive(plant: Measured, c: Course) -> float:
     return k_t * (p.loop.K_w if p.loop and kind == "speed-loop" else 1.0)
 
 
-def _motion(plant: Measured, model: axis.Model, c: Course, half: float) -> Motion:
-    n_half = max(3, round(half / c.period))
-    if c.position is not None:
-        theta, w, a = local_polynomial(c.t, c.position, n_half, 3)[:3]
-        noise = c.noise.get("position", 0.0) / (n_half**1.5 * c.period)
-    elif c.speed is not None:
-        w, a = local_polynomial(c.t, c.speed, n_half, 2)[:2]
-        noise = c.noise.get("speed", 0.0) / n_half**0.5
-        theta = np.concatenate(([0.0], np.cumsum(np.diff(c.t) * 0.5 * (w[1:] + w[:-1]))))
-    theta = theta + c.zero
-    rest = max(SEEN * noise, CREEP * float(np.sqrt(np.mean(w**2))))
-    direction = np.where(np.abs(w) > rest, np.sign(w), 0.0)
-    i, drive = _current(c, w, model.z)
-    is_force = c.bench.roles.kind == "force"
-    known = axis.torque_along(model, theta, w, i, c.t, c.dT, force=is_force)
-    still = np.zeros(len(w), bool)
-    motion = Motion(c.t, theta, w, a, drive, known, direction, c.position is not None, still, dT=c.dT)
-    motion = replace(motion, gear_orders=tuple(plant.plant.gear_orders))
-    if c.other is None or plant.plant.neighbour is None:
-        return motion
-    psi, v, accelerates = local_polynomial(c.t, c.other, n_half, 3)[:3]
-    return replace(motion, other=(psi, v, accelerates), neighbour=plant.plant.neighbour)
-
-
-def _at_rest(plant: Measured, model: axis.Model, c: Course) -> Motion:
-    assert c.position is not None
-    assert c.direction is not None
-    k_t = float(plant.plant.k_t or 1.0)
-    theta = c.position + c.zero
-    held = axis.holding(model, theta, c.direction, c.t)
-    zero = np.zeros(len(c.t))
-    drive = k_t * c.drive
-    return Motion(
-        c.t, theta, zero, zero, drive, drive - k_t * held, c.direction, True, np.ones(len(c.t), bool), dT=c.dT
-    )  # fmt: skip
-
-
-def _current(c: Course, w: Array, z: Array) -> tuple[Array, Array]:
-    """Current (or force) along the motion, and the drive's torque."""
-    kind, k_t = c.bench.roles.kind, float(z[row("k_t")])
-    at = c.t - c.late * c.period
-    drive = (np.interp(at, c.t, c.drive) - z[row("drive_offset.offset")]) / (1.0 + z[row("drive_gain.gain")])
-    if kind == "force":
-        return drive, drive
-    if c.current is not None:
-        drive = c.current
-    elif kind == "voltage":  # quasi-static: the electrical time constant is shorter than a test function
-        drive = (drive - z[row("k_e")] * w) / max(float(z[row("R")]), 1e-9)
-    elif kind == "speed-loop":
-        drive = np.clip(z[row("K_w")] * (drive - w), -z[row("I_max")], z[row("I_max")])
-    return drive, k_t * drive
-
-
 def _means(n: int, every: int) -> csr_array:
     """Means over `every` readings that follow each other."""
     m = max(n // every, 1)
@@ -312,16 +182,3 @@ def _stacked(matrices: list[tuple[csr_array, int, int]], total: int) -> csr_arra
         m = matrix.tocoo()
         parts.append(csr_array((m.data, (m.row, m.col + offset)), shape=(matrix.shape[0], total)))
     return csr_array(vstack(parts))
-
-
-def _joined(motions: list[Motion]) -> Motion:
-    def of(name: str) -> Array:
-        return np.concatenate([getattr(m, name) for m in motions])
-
-    columns = (of("t"), of("theta"), of("w"), of("a"), of("drive"), of("known"), of("direction"))
-    motion = Motion(*columns, all(m.has_position for m in motions), of("static").astype(bool), dT=of("dT"))
-    motion = replace(motion, gear_orders=motions[0].gear_orders)
-    if not all(m.neighbour for m in motions):
-        return motion
-    psi, v, a = (np.concatenate([m.other[k] for m in motions]) for k in range(3))
-    return replace(motion, other=(psi, v, a), neighbour=motions[0].neighbour)

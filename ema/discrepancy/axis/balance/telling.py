@@ -9,7 +9,7 @@ import numpy as np
 from ema.core.records import Array
 from ema.discrepancy.axis.linear import in_metres
 
-from .choice import Balance, Term
+from .found import Balance, Term
 from .law import Law
 from .telling_records import by_record
 

@@ -1,0 +1,73 @@
+"""What a regression of the balance found: its laws, how sure each is, and what is left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .agreement import Agreement, against
+from .attenuation import Corrected
+from .law import Law
+from .regression import Plain, Regression
+
+
+@dataclass(frozen=True)
+class Term:
+    """A law that the records need.
+
+    `power` is the mean square [N² m² or N²] that held-out blocks lose by it, `alike` what does as well, by how often
+    it wins over draws of blocks; `wins` how often this law does. `common` is the share that another law of the
+    library has on average in common with this one, on these motions: so much of an unknown rest may be taken for it.
+    """
+
+    law: Law
+    power: float
+    wins: float
+    alike: dict[str, float]
+    common: float
+
+
+@dataclass(frozen=True)
+class Balance:
+    """What a regression of the balance explains.
+
+    Attributes
+    ----------
+    corrected : Corrected
+        Coefficients without what noise in the regressors takes from them, with their covariance.
+    drive : float
+        Mean square of the drive's torque about its mean. [N² m² or N²]
+    left_plain, left_base, left : float
+        Mean square left on held-out blocks by the plant file's numbers, with inertia, friction and drag fitted, and
+        with the laws found.
+    noise : float
+        What the sensors' noise leaves.
+    agreements : tuple of Agreement
+        Where several records are given: each coefficient record by record.
+    given : tuple of Law
+        What the plant file declares beside inertia, friction and drag: a neighbouring axis.
+    """
+
+    model: Regression
+    corrected: Corrected
+    plain: Plain
+    terms: tuple[Term, ...]
+    drive: float
+    left_plain: float
+    left_base: float
+    left: float
+    noise: float
+    agreements: tuple[Agreement, ...] = ()
+    given: tuple[Law, ...] = ()
+
+    def confidence(self, term: Term) -> float:
+        """How often the law wins, times its mark over that and what of the rest it may have been taken for.
+
+        What records contradict each other in counts against it.
+        """
+        rest = term.common * max(self.left - self.noise, 0.0)
+        sure = term.wins * term.power / (term.power + rest) if term.power > 0.0 else 0.0
+        return sure * against(term.law, self.agreements)
+
+    def explained(self, left: float) -> float:
+        """Share of the drive's torque, as a coefficient of determination."""
+        return 1.0 - left / self.drive

@@ -1,0 +1,150 @@
+"""The balance of all records: rows as wide as the acceleration needs, and the laws that they call for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ema.models.axis_config import LinearAxis
+
+from .agreement import INEXACT, agreements
+from .apart import apart
+from .attenuation import attenuation
+from .choice import chosen
+from .course import Course, courses
+from .found import Balance
+from .law import Acting, Law
+from .laws import laws
+from .links import links
+from .own_zeros import with_zeros
+from .regression import Plain, Regression, fitted
+from .rows import Rows, rows
+from .units import LINEAR, ROTARY, of_base
+from .widths import LONGEST, STILL, half_widths
+
+if TYPE_CHECKING:
+    from ema.discrepancy.axis.measured import Measured
+
+CONSTANT = 0.02  # share by which a voltage must change to drive by more than its value
+APART = 0.05  # of a law's size that must stand out of what inertia, dry friction and drag do
+N_WIDTHS = 3  # rounds
+MOVED = 2.0  # deviations of the difference between two widths, from which an inertia is another
+N_WIDER = 3  # times that test functions are made twice as wide
+LONG = 0.5  # share of a row that must show which way friction acts, however small that is
+
+
+def balance(plant: Measured) -> Balance | None:
+    """The balance of all records; None where no stretch of motion is long enough."""
+    p = plant.plant
+    plain = Plain(p.inertia, p.F_d, p.C, 1.0 if p.is_force else float(p.k_t or 1.0))
+    recorded = with_zeros(plant, courses(plant), plain)
+    found = rows(plant, recorded)
+    if found is None:
+        return None
+    linear = isinstance(p, LinearAxis)
+    if _is_given(plant, recorded, found):
+        return None
+    size = float(np.sqrt(np.mean(found.drive**2)))
+    answer, widths, unsure = None, None, 0.0
+    for _ in range(N_WIDTHS):  # how wide test functions must be depends on what stands beside the acceleration
+        first = answer.model if answer is not None else fitted(found, plain, [])
+        wider = half_widths(recorded, _heaviest(first, p.inertia), size)
+        if widths is not None and all(wider[name] <= widths[name] for name in wider):
+            break
+        widths = wider if widths is None else {name: max(wider[name], widths[name]) for name in wider}
+        unsure = unsure_share(first, plain, size)
+        found = rows(plant, recorded, widths, unsure) or found
+        answer = chosen(found, plain, shown_by(found, list(every_law(found, linear=linear))), given(found))
+    assert answer is not None
+    assert widths is not None
+    for _ in range(N_WIDER):
+        wide = {name: 2.0 * half for name, half in widths.items()}
+        slower = rows(plant, recorded, wide, unsure)
+        if slower is None or _has_no_room(recorded, wide) or not _is_moved(answer.model, slower, plain):
+            break
+        found, widths = slower, wide
+        answer = chosen(found, plain, shown_by(found, list(every_law(found, linear=linear))), given(found))
+    return replace(
+        answer,
+        corrected=attenuation(plant, recorded, widths, plain, answer.model, unsure),
+        agreements=tuple(agreements(found, plain, answer.model)),
+    )
+
+
+def _has_no_room(recorded: Sequence[Course], widths: dict[str, float]) -> bool:
+    return any(not c.static and float(np.ptp(c.t)) < LONGEST * widths[c.record] for c in recorded)
+
+
+def _is_moved(model: Regression, slower: Rows, plain: Plain) -> bool:
+    """Whether slower test functions give another inertia: then the quick part of the motion is none that the laws make.
+
+    A frame that swings, a gear that gives or noise beyond what the sensors are known to have takes from every
+    coefficient, the more the narrower test functions are (Hausman, "Specification tests in econometrics",
+    Econometrica 46, 1978).
+    """
+    if "inertia" not in model.base:
+        return False
+    other = fitted(slower, plain, model.laws)
+    if other.base != model.base:
+        return False
+    k = model.base.index("inertia")
+    here, there = float(model.coefficients[k]), float(other.coefficients[k])
+    spread = float(np.sqrt(abs(other.covariance()[k, k] - model.covariance()[k, k])))
+    return abs(there - here) > max(MOVED * spread, INEXACT * max(abs(here), abs(there)))
+
+
+def every_law(found: Rows, *, linear: bool) -> list[Law]:
+    """Laws that all records share, and each with own coefficients by record."""
+    shared = list(laws(found.motion, linear=linear))
+    return [*shared, *apart(found.motion, shared, of_base(LINEAR if linear else ROTARY))]
+
+
+def shown_by(found: Rows, every: Sequence[Law]) -> list[Law]:
+    """Laws that the motions can show beside inertia, dry friction and drag."""
+    m = found.motion
+    base = np.column_stack([found.alpha, found.integrate @ m.direction, found.integrate @ m.w])
+    size = np.linalg.norm(base, axis=0)
+    q, _ = np.linalg.qr(base[:, size > 0.0] / size[size > 0.0])
+    out = []
+    for law in every:
+        if law.needs_acting:
+            out.append(law)
+            continue
+        A = np.column_stack(found.of(law, Acting(m.drive, m.drive, m.drive)))
+        beside = np.linalg.norm(A - q @ (q.T @ A), axis=0)
+        if bool((beside > APART * np.linalg.norm(A, axis=0)).any()):
+            out.append(law)
+    return out
+
+
+def given(found: Rows) -> list[Law]:
+    """Laws that the plant file declares: of a neighbouring axis."""
+    return [links(found.motion)] if found.motion.neighbour else []
+
+
+def unsure_share(model: Regression, plain: Plain, drive: float) -> float:
+    """Share of a row in which friction may act either way, or less than in sliding, and be no more than noise."""
+    if "dry_friction" not in model.base:
+        return 0.0
+    F_d = plain.F_d + float(model.coefficients[model.base.index("dry_friction")])
+    return min(STILL * drive / max(abs(F_d), 1e-300), LONG)
+
+
+def _heaviest(model: Regression, inertia: float) -> float:
+    """The largest coefficient of an acceleration, of the fit or the plant file. [kg m² or kg]"""
+    found = [inertia, *(model.coefficients[:1].tolist() if "inertia" in model.base else [])]
+    for law in model.laws:
+        if law.name == "linked_axis":
+            found += model.coefficients[model.part(law)][:2].tolist()
+    return float(np.max(np.abs(found)))
+
+
+def _is_given(plant: Measured, recorded: Sequence[Course], found: Rows) -> bool:
+    """Whether the drive's torque is no measurement: by a constant voltage it is a function of speed, whatever acts."""
+    if plant.plant.drive != "voltage" or any(c.current is not None for c in recorded):
+        return False
+    u = found.integrate @ np.concatenate([c.drive for c in recorded])
+    return float(np.ptp(np.abs(u))) < CONSTANT * float(np.abs(u).max(initial=0.0))
