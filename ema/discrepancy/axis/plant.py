@@ -21,18 +21,16 @@ from .balance import Balance, balance
 from .intake import intake
 from .naming import Numbers, numbers_of
 from .noise import ESTIMATE_UNCERTAINTY
+from .noise_model import position_noise, whitener, without_start
 from .pack import Pack
 from .predictable import LONGEST_WINDOW, predictable
 from .screened import screened
 from .undersampled import refuse_undersampled
-from .whitening import Filter, design, open_loop_variance
-from .windows import START_NOISE, Bench, Window, bench, speed_noise
+from .windows import Bench, Window, bench
 from .zeros import zeros
 
-TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
 NOISE = 3.0  # deviations of the position's noise that are no way
 RUNAWAY = 1e6  # a window that runs away counts as no worse than this
-FIRST, FIRST_PART = 12, 4  # samples at least, and share of a window, to which its start state is fitted
 H_MAX = 2.5e-4  # [s] longest step of the simulation, unless the record's own period is longer than ten of them
 
 
@@ -81,7 +79,7 @@ class AxisPlant:
         self.windows: tuple[Window, ...] = tuple(w for b in benches for w in b.windows)
         self._bench_of = [b for b in benches for _ in b.windows]
         pairs = zip(self._bench_of, self.windows, strict=True)
-        self.filters = [None if w.static else self._filter(b, w) for b, w in pairs]
+        self.filters = [None if w.static else whitener(self.plant, b, w) for b, w in pairs]
         self._packs: dict[tuple[int, ...], list[Pack]] = {}
 
     # ---- the engine's view -------------------------------------------------------------------------------------
@@ -124,7 +122,7 @@ class AxisPlant:
         for j, r in zip(blocks, self.free_run(point, blocks), strict=True):
             main = self.main_row(j)
             y = self.windows[j].outputs[main]
-            r, floor = self._started(j, r)
+            r, floor = without_start(self.plant, self._bench_of[j], self.windows[j], r)
             is_position = not self.windows[j].static and self._bench_of[j].roles.speed is None
             power = float(np.var(y)) if is_position else float(np.mean(y**2))
             squares.setdefault(self.windows[j].group, []).append(
@@ -259,94 +257,13 @@ class AxisPlant:
         """Share of friction that is built up where windows begin, by the motion before them."""
         if not axis.has_memory(model):
             return None
-        play = NOISE * self._position_noise(pack.bench, pack.windows[0])
+        play = NOISE * position_noise(pack.bench, pack.windows[0])
         return axis.bristles_after(model, *pack.history, play)
-
-    def _filter(self, b: Bench, w: Window) -> Filter:
-        H, noise, process, damping, excursion = self._noise_model(b, w)
-        return design(H, noise, process, w.t, excursion, damping)
-
-    def _noise_model(
-        self, b: Bench, w: Window, *, turning: bool = True
-    ) -> tuple[Array, Array, Array, float, tuple[float, float]]:
-        p, kind = self.plant, b.roles.kind
-        k_t = 1.0 if kind == "force" else float(p.k_t or 1.0)
-        k_e, R, L, J = float(p.k_e or 0.0), max(float(p.R or 0.0), 1e-9), float(p.L or 0.0), p.inertia
-        acceleration = np.gradient(w.speed, w.t)
-        drive_noise = b.noise[b.roles.drive].rms(np.gradient(w.drive, w.t))
-        rows, noise = [], []
-        for place, name in enumerate(b.roles.outputs):
-            sigma = b.noise[name]
-            if name in ("theta_m", "q"):
-                rows.append((1.0, 0.0))
-                noise.append(sigma.rms(w.speed))
-            elif name in ("w_m", "v"):
-                rows.append((0.0, 1.0))
-                noise.append(sigma.rms(acceleration))
-            elif name == "u_q":
-                rows.append((0.0, k_e))
-                through = np.hypot(R, L / (np.sqrt(2.0) * w.period)) * drive_noise
-                noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
-            else:
-                rows.append((0.0, -k_e / R if kind == "voltage" else -(p.loop.K_w if p.loop else 0.0)))
-                through = np.sqrt(w.period / (2.0 * L / R + w.period)) / R * drive_noise if kind == "voltage" else 0.0
-                noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
-        gain, damping = {
-            "current": (k_t, p.C / J),
-            "force": (1.0, p.C / J),
-            "voltage": (k_t / R, (p.C + k_t * k_e / R) / J),
-            "speed-loop": (k_t * (p.loop.K_w if p.loop else 0.0),) * 2,
-        }[kind]
-        if kind == "speed-loop":
-            damping = gain / J
-        process = gain / J * drive_noise
-        at_rest = np.abs(w.speed) < 3.0 * START_NOISE * self._speed_noise(b, w)
-        process = np.where(at_rest & np.roll(at_rest, 1) & np.roll(at_rest, -1), 0.0, process)
-        turns = np.diff(np.where(at_rest, 0.0, np.sign(w.speed)), prepend=np.sign(w.speed[0])) != 0.0
-        turns |= np.roll(turns, -1) | np.roll(turns, 1)
-        process = np.where(turns & turning, np.hypot(process, TURNING * 2.0 * float(p.F_s or p.F_d) / J), process)
-        excursion = (
-            0.1 * float(np.ptp(w.position)) + 20.0 * self._position_noise(b, w),
-            0.1 * float(np.ptp(w.speed)) + 20.0 * self._speed_noise(b, w),
-        )
-        return np.array(rows), np.array(noise), process, float(damping), excursion
-
-    def _speed_noise(self, b: Bench, w: Window) -> float:
-        return speed_noise(b.roles, b.noise, w.period)
-
-    def _position_noise(self, b: Bench, w: Window) -> float:
-        if b.roles.position is not None:
-            return b.noise[b.roles.position].sigma
-        return self._speed_noise(b, w) * w.period
 
     def main_row(self, block: int) -> int:
         """Row of the output that is shown and whose error is reported."""
         who = self._bench_of[block].roles
         return who.outputs.index(who.speed) if who.speed in who.outputs and not self.windows[block].static else 0
-
-    def _started(self, block: int, r: Array) -> tuple[Array, Array]:
-        """Residual less what another start state makes of it, fitted to the window's first part, and its variance."""
-        b, w = self._bench_of[block], self.windows[block]
-        if w.static:
-            return r, np.full((1, w.n), b.noise[b.roles.drive].sigma ** 2)
-        H, noise, process, damping, _ = self._noise_model(b, w, turning=False)
-        dt = np.append(np.diff(w.t), 0.0)
-        now = np.empty(noise.shape)
-        open_loop_variance(H, noise, process, dt, np.zeros(3), damping, now)
-        late = w.t - w.t[0]
-        fade = np.exp(-damping * late)
-        reach = (1.0 - fade) / damping if damping > 0.0 else late
-        modes = np.stack([H[:, :1] + 0.0 * late, H[:, :1] * reach + H[:, 1:] * fade], axis=2)  # (n_channels, n, 2)
-        first = slice(0, max(FIRST, w.n // FIRST_PART))
-        weight = 1.0 / now[:, first]
-        A = np.einsum("cni,cn,cnj->ij", modes[:, first], weight, modes[:, first])
-        known = b.roles.position is not None
-        A = A if known else A + np.diag([1.0 / self._position_noise(b, w) ** 2, 0.0])
-        covariance = np.linalg.inv(A)
-        start = covariance @ np.einsum("cni,cn,cn->i", modes[:, first], weight, r[:, first])
-        out = np.empty(noise.shape)
-        open_loop_variance(H, noise, process, dt, covariance[np.triu_indices(2)], damping, out)
-        return r - modes @ start, out
 
 
 _KERNEL_ROW = {"theta_m": 0, "q": 0, "w_m": 1, "v": 1, "i_q": 2, "u_q": 3}

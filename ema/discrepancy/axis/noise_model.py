@@ -1,0 +1,127 @@
+"""What noise makes of a free run of the right model: of each output, of the drive, of the start state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema.core.records import Array
+from ema.models.axis_config import Axis
+
+from .whitening import Filter, design, open_loop_variance
+from .windows import START_NOISE, Bench, Window, speed_noise
+
+TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
+FIRST, FIRST_PART = 12, 4  # samples at least, and share of a window, to which its start state is fitted
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Noise of one window; see `whitening.design`.
+
+    Attributes
+    ----------
+    H : array, shape (n_channels, 2)
+        How each output sees a deviation of position and speed.
+    noise : array, shape (n_channels, n_times)
+        Rms of each output's noise.
+    process : array, shape (n_times,)
+        Rms of the acceleration that the drive's noise makes. [rad/s² or m/s²]
+    damping : float
+        [1/s]
+    excursion : two floats
+        How far position and speed may start from the truth, generously.
+    """
+
+    H: Array
+    noise: Array
+    process: Array
+    damping: float
+    excursion: tuple[float, float]
+
+
+def position_noise(b: Bench, w: Window) -> float:
+    """Rms noise of the position, measured or integrated from the speed over one sample. [rad or m]"""
+    if b.roles.position is not None:
+        return b.noise[b.roles.position].sigma
+    return speed_noise(b.roles, b.noise, w.period) * w.period
+
+
+def whitener(p: Axis, b: Bench, w: Window) -> Filter:
+    """The filter that makes a window's residual white."""
+    m = noise_model(p, b, w)
+    return design(m.H, m.noise, m.process, w.t, m.excursion, m.damping)
+
+
+def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseModel:
+    """Noise of a window; with `turning`, also of the moment at which friction turns round."""
+    kind = b.roles.kind
+    k_t = 1.0 if kind == "force" else float(p.k_t or 1.0)
+    k_e, R, L, J = float(p.k_e or 0.0), max(float(p.R or 0.0), 1e-9), float(p.L or 0.0), p.inertia
+    acceleration = np.gradient(w.speed, w.t)
+    drive_noise = b.noise[b.roles.drive].rms(np.gradient(w.drive, w.t))
+    rows, noise = [], []
+    for place, name in enumerate(b.roles.outputs):
+        sigma = b.noise[name]
+        if name in ("theta_m", "q"):
+            rows.append((1.0, 0.0))
+            noise.append(sigma.rms(w.speed))
+        elif name in ("w_m", "v"):
+            rows.append((0.0, 1.0))
+            noise.append(sigma.rms(acceleration))
+        elif name == "u_q":
+            rows.append((0.0, k_e))
+            through = np.hypot(R, L / (np.sqrt(2.0) * w.period)) * drive_noise
+            noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
+        else:
+            rows.append((0.0, -k_e / R if kind == "voltage" else -(p.loop.K_w if p.loop else 0.0)))
+            through = np.sqrt(w.period / (2.0 * L / R + w.period)) / R * drive_noise if kind == "voltage" else 0.0
+            noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
+    gain, damping = {
+        "current": (k_t, p.C / J),
+        "force": (1.0, p.C / J),
+        "voltage": (k_t / R, (p.C + k_t * k_e / R) / J),
+        "speed-loop": (k_t * (p.loop.K_w if p.loop else 0.0),) * 2,
+    }[kind]
+    if kind == "speed-loop":
+        damping = gain / J
+    process = gain / J * drive_noise
+    at_rest = np.abs(w.speed) < 3.0 * START_NOISE * speed_noise(b.roles, b.noise, w.period)
+    process = np.where(at_rest & np.roll(at_rest, 1) & np.roll(at_rest, -1), 0.0, process)
+    turns = np.diff(np.where(at_rest, 0.0, np.sign(w.speed)), prepend=np.sign(w.speed[0])) != 0.0
+    turns |= np.roll(turns, -1) | np.roll(turns, 1)
+    process = np.where(turns & turning, np.hypot(process, TURNING * 2.0 * float(p.F_s or p.F_d) / J), process)
+    excursion = (
+        0.1 * float(np.ptp(w.position)) + 20.0 * position_noise(b, w),
+        0.1 * float(np.ptp(w.speed)) + 20.0 * speed_noise(b.roles, b.noise, w.period),
+    )
+    return NoiseModel(np.array(rows), np.array(noise), process, float(damping), excursion)
+
+
+def without_start(p: Axis, b: Bench, w: Window, r: Array) -> tuple[Array, Array]:
+    """Free-run residual less what another start state makes of it, and its variance; both (n_channels, n_times).
+
+    The start state is fitted to the window's first part.
+    """
+    if w.static:
+        return r, np.full((1, w.n), b.noise[b.roles.drive].sigma ** 2)
+    m = noise_model(p, b, w, turning=False)
+    H, damping = m.H, m.damping
+    dt = np.append(np.diff(w.t), 0.0)
+    now = np.empty(m.noise.shape)
+    open_loop_variance(H, m.noise, m.process, dt, np.zeros(3), damping, now)
+    late = w.t - w.t[0]
+    fade = np.exp(-damping * late)
+    reach = (1.0 - fade) / damping if damping > 0.0 else late
+    modes = np.stack([H[:, :1] + 0.0 * late, H[:, :1] * reach + H[:, 1:] * fade], axis=2)  # (n_channels, n, 2)
+    first = slice(0, max(FIRST, w.n // FIRST_PART))
+    weight = 1.0 / now[:, first]
+    A = np.einsum("cni,cn,cnj->ij", modes[:, first], weight, modes[:, first])
+    known = b.roles.position is not None
+    A = A if known else A + np.diag([1.0 / position_noise(b, w) ** 2, 0.0])
+    covariance = np.linalg.inv(A)
+    start = covariance @ np.einsum("cni,cn,cn->i", modes[:, first], weight, r[:, first])
+    out = np.empty(m.noise.shape)
+    open_loop_variance(H, m.noise, m.process, dt, covariance[np.triu_indices(2)], damping, out)
+    return r - modes @ start, out
