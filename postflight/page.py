@@ -72,6 +72,7 @@ def page(log: LogReader, settings: ReportSettings) -> str:
             end=iso(history.last_ns),
             duration=span((history.last_ns - history.first_ns) / 1e9),
             logs=log.paths,
+            copies=log.copies,
             unfinished=log.unfinished,
             damage=log.damage,
             software=log.metadata().get("software", "not named in the log"),

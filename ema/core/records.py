@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
@@ -131,11 +132,21 @@ def read_record(path: str | Path, plan: Sidecar | None = None) -> Record:
 def each_once(paths: Iterable[Path]) -> list[Path]:
     """The records' files; RecordError for one given twice, which would count as evidence of its own."""
     found: dict[Path, Path] = {}
+    contents: dict[bytes, Path] = {}
     for path in paths:
         if path.resolve() in found:
             raise RecordError(f"{path}: is given twice (a folder stands for every log in it)")
         found[path.resolve()] = path
+        if path.is_file():
+            original = contents.setdefault(_digest(path), path)
+            if original is not path:
+                raise RecordError(f"{path}: is given twice: {original} holds the same, byte for byte")
     return list(found.values())
+
+
+def _digest(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").digest()
 
 
 def _reader(suffix: str) -> Callable[[Path, Sidecar | None], Record]:

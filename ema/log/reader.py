@@ -13,6 +13,7 @@ from ema.core.closing import Closing
 from ema.core.errors import LogError
 
 from . import batches, schemas
+from .copies import Copy, each_flight_once
 from .folder import is_held
 from .retention import newest
 from .scan import Damage, McapFile
@@ -44,7 +45,7 @@ class LogReader(Closing):
     Parameters
     ----------
     paths : path or paths
-        Files or directories of files; read in the order of their first messages.
+        Files or directories of files; read in the order of their first messages. Of copies of one flight, one.
     start_ns, end_ns : int, optional
         Only what happened in [start_ns, end_ns). [ns since the Unix epoch]
 
@@ -52,6 +53,8 @@ class LogReader(Closing):
     ----------
     damage : list of Damage
         What could not be read so far (the first thousand); grows while reading.
+    copies : list of Copy
+        Files left out, since another one holds the same flight.
 
     Raises
     ------
@@ -65,10 +68,12 @@ class LogReader(Closing):
         self.damage: list[Damage] = []
         self.start_ns, self.end_ns = start_ns, end_ns
         self._files: list[McapFile] = []
+        self.copies: list[Copy] = []
         try:
             for path in find_logs(paths, (".mcap",)):
                 self._files.append(McapFile(path, self._note))
             self._files.sort(key=_order)
+            self._files, self.copies = self._each_once(self._files)
         except LogError:
             self.close()
             raise
@@ -99,7 +104,7 @@ class LogReader(Closing):
         return [*map(str, self.damage), *(f"{path}: was not finished: what came last may be missing" for path in cut)]
 
     def remarks(self) -> list[str]:
-        """What else is to be known: a log still being written, a copy of a damaged one, a segment that is not there."""
+        """What else is to be known: a flight given twice, a log still written, a recovered copy, a segment missing."""
         live = [f"{path}: is still being written" for path in self.unfinished if _is_live(path)]
         copies, absent = [], []
         names = {file.path.name for file in self._files}
@@ -111,7 +116,7 @@ class LogReader(Closing):
             before = said.get(BEFORE_KEY)
             if place and before is not None and not {before, before.replace(".mcap", COPY_SUFFIX)} & names:
                 absent.append(f"{file.path}: follows {before}, which is not among the files read")
-        return live + copies + absent
+        return [*map(str, self.copies), *live, *copies, *absent]
 
     def messages(self, wanted: Callable[[str], bool] = lambda topic: True) -> Iterator[Message]:
         """Messages on the wanted topics, without the raw frames, in the order they were written."""
@@ -156,6 +161,15 @@ class LogReader(Closing):
     def metadata(self) -> dict[str, str]:
         """Key-value pairs of the first segment."""
         return self._files[0].metadata() if self._files else {}
+
+    def _each_once(self, files: list[McapFile]) -> tuple[list[McapFile], list[Copy]]:
+        kept, copies = each_flight_once(files)
+        for file in files:
+            if file not in kept:
+                file.close()
+        left_out = {copy.path for copy in copies}
+        self.damage = [damage for damage in self.damage if damage.path not in left_out]
+        return kept, copies
 
     def _note(self, damage: Damage) -> None:
         if len(self.damage) < 1000 and damage not in self.damage:

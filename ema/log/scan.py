@@ -110,6 +110,12 @@ class McapFile:
                 return int(at_rest.MESSAGE.unpack(self._read(place.begin, at_rest.MESSAGE.size))[2])
         return None
 
+    def chunk_heads(self) -> Iterator[ChunkHead]:
+        """What each chunk says of itself."""
+        for place in self._data.places():
+            if place.opcode == Opcode.CHUNK and (head := at_rest.chunk_head(place, self._read)):
+                yield head
+
     def messages(
         self, wanted: Callable[[str], bool], start_ns: int | None = None, end_ns: int | None = None
     ) -> Iterator[RawMessage]:

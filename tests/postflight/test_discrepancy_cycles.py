@@ -59,6 +59,10 @@ def test_a_record_given_twice_is_refused(fly, coarse_bundle, tmp_path):
         _read([tmp_path, segment])
     with pytest.raises(RecordError, match="is given twice"):
         _read([segment, segment])
+    copy = tmp_path / "elsewhere.mcap"
+    copy.write_bytes(segment.read_bytes())
+    with pytest.raises(RecordError, match=r"elsewhere\.mcap: is given twice: .* holds the same, byte for byte"):
+        _read([segment, copy])
     assert len(_read([segment])[0]) == 1
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 
 import numpy as np
@@ -207,6 +208,23 @@ def _series(n, sd=0.01):
         content = {"t_ns": at, "cycle": at, "status": "valid", "reasons": [], "k": row.tolist(), "sd": [sd] * 6}
         series.add(content, float(at))
     return series, k
+
+
+def test_the_same_flight_given_ten_times_makes_the_same_report(faulty_flight, tmp_path):
+    (log,) = faulty_flight.iterdir()
+    copies = [tmp_path / f"copy-{n}.mcap" for n in range(10)]
+    for copy in copies:
+        shutil.copy(log, copy)
+    shown = []
+    for number, given in enumerate(([log], [log, *copies])):
+        path = tmp_path / f"{number}.html"
+        answer = CliRunner().invoke(report, [*map(str, given), "--out", str(path)], catch_exceptions=False)
+        assert answer.exit_code == 0
+        shown.append(re.findall(r'data-k=.*? data-sd=".*?"|<tr><td>valid.*', path.read_text()))
+    assert len(shown[0]) == len(FAULTS) + 1
+    assert shown[0] == shown[1]
+    assert answer.stderr.count("is the same flight as") == 10
+    assert path.read_text().count("is the same flight as") == 10
 
 
 def test_a_long_series_is_kept_in_bounded_memory_without_losing_its_mean_last_value_or_information():
