@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.balance import balance
+from ema.discrepancy.axis.balance.of_records import balance
 from ema.discrepancy.axis.balance.smooth import bumps_at, local_polynomial
 from ema.discrepancy.axis.balance.telling import sentences, told
 from ema.discrepancy.axis.between import examined

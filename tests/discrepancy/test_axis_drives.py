@@ -10,9 +10,9 @@ import pytest
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.balance.course import courses
+from ema.discrepancy.axis.balance.integrated import rows
 from ema.discrepancy.axis.balance.laws import laws
 from ema.discrepancy.axis.balance.of_records import shown_by
-from ema.discrepancy.axis.balance.rows import rows
 from ema.discrepancy.axis.balance.telling import told
 from ema.discrepancy.axis.closed_loop import closed_loop
 from ema.discrepancy.axis.plant import AxisPlant

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.balance import balance
 from ema.discrepancy.axis.balance.as_effects import point
 from ema.discrepancy.axis.balance.laws import laws
+from ema.discrepancy.axis.balance.of_records import balance
 from ema.discrepancy.axis.balance.telling import told
 from ema.discrepancy.axis.between import examined
 from ema.discrepancy.axis.plant import AxisPlant

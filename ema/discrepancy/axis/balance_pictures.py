@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from ema.core.records import Array
 from ema.discrepancy.report import Picture, picture
 
-from .balance import Balance
+from .balance.found import Balance
 
 N_BINS = 40
 TURNS = 2.0  # of travel, from which the position is shown within one turn

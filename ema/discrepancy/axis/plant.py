@@ -17,7 +17,8 @@ from ema.models.axis_config import INSTANCE, LINES, Axis
 from ema.models.axis_layout import row
 
 from . import candidates, describe, structure
-from .balance import Balance, balance
+from .balance.found import Balance
+from .balance.of_records import balance
 from .intake import intake
 from .naming import Numbers, numbers_of
 from .noise import ESTIMATE_UNCERTAINTY

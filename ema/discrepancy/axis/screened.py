@@ -12,8 +12,8 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 from ema.models.axis_config import LINES, Axis
 
-from .balance import Balance
 from .balance.as_effects import effects, line_point
+from .balance.found import Balance
 
 SCREENED = (
     *("viscous_by_direction", "pendulum", "output_load_friction", "drive_unequal", "viscous_slope", "friction_slope"),

@@ -8,12 +8,14 @@ What the laws explain of the drive's torque is told whatever the free runs say.
 =============  ==========================================================================================
 `course`       each cycle as it was recorded: time stamps as they are, position, speed, drive's torque
 `smooth`       local polynomials, and test functions, on irregular time stamps
-`motion`       angle, speed, acceleration and torque along the courses, as laws see them
+`motion`       what laws see: angle, speed, acceleration and torque, sample by sample
+`sampled`      the same along courses
 `law`, `laws`  what may act: columns of the regression with their names, units and sentences
 `along`        laws by position
 `links`        the law of a neighbouring axis
 `widths`       how wide test functions must be
-`rows`         the balance integrated against test functions, in blocks, with its noise
+`rows`         what the regression sees: rows in blocks that can be held out
+`integrated`   the balance integrated against test functions: rows of records
 `regression`   least squares with held-out blocks and intervals that blocks agree on
 `attenuation`  errors in the regressors: what noise takes from each coefficient, undone
 `choice`       which laws the records need, and what cannot be told from each
@@ -22,8 +24,3 @@ What the laws explain of the drive's torque is told whatever the free runs say.
 `telling`      the balance in words and numbers, and as causes beside those of the free runs
 =============  ==========================================================================================
 """
-
-from .found import Balance
-from .of_records import balance
-
-__all__ = ["Balance", "balance"]

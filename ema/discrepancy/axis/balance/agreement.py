@@ -20,8 +20,8 @@ from scipy import stats
 from ema.core.records import Array
 
 from .apart import DIFFERS, by_record
-from .law import Law
-from .regression import BY_RECORD, Plain, Regression, fitted
+from .law import BY_RECORD, BY_RECORD_NAME, Law
+from .regression import Plain, Regression, fitted
 from .rows import Rows
 
 INEXACT = 0.1  # of a coefficient, that another motion may move it by, since no law has quite the right form
@@ -99,7 +99,7 @@ def _of_law(found: Rows, plain: Plain, model: Regression, law: Law, n_blocks: in
     part = fit.part(own)
     n = own.n_columns // len(found.motion.records)
     covariance = fit.covariance()[part, part]
-    name = law.name.removesuffix(BY_RECORD.replace(" ", "_"))
+    name = law.name.removesuffix(BY_RECORD_NAME)
     return _compared(name, own, fit.coefficients[part].reshape(-1, n), covariance, n_blocks, needed=own is law)
 
 

@@ -8,9 +8,8 @@ import numpy as np
 
 from ema.core.records import Array
 
-from .law import Columns, Law, Values, one
+from .law import BY_RECORD, Columns, Law, Values, one
 from .motion import Motion
-from .regression import BY_RECORD
 from .units import Units
 
 N_PLACES, N_ORDERS = 12, 320  # members of a family

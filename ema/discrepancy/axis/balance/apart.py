@@ -13,9 +13,8 @@ import numpy as np
 
 from ema.core.records import Array
 
-from .law import Acting, Law
+from .law import BY_RECORD, BY_RECORD_NAME, Acting, Law
 from .motion import Motion
-from .regression import BY_RECORD
 
 DIFFERS = {  # what may be another in each record without contradicting a cause, and why
     "inertia": "another load on the axis",
@@ -55,7 +54,7 @@ def by_record(law: Law, n_records: int) -> Law:
         law,
         family=law.family + BY_RECORD,
         key=law.key + BY_RECORD,
-        name=law.name + BY_RECORD.replace(" ", "_"),
+        name=law.name + BY_RECORD_NAME,
         columns=columns,
         values=lambda c: law.values(c.reshape(n_records, -1).mean(axis=0)),
         sentence="on average of the records, and another in each: " + law.sentence,
@@ -79,7 +78,7 @@ def _beside_mean(name: str, column: _Column, unit: str, *, is_friction: bool, re
     return Law(
         name + BY_RECORD,
         name + BY_RECORD,
-        name + BY_RECORD.replace(" ", "_"),
+        name + BY_RECORD_NAME,
         columns,
         {"spread": unit},
         values,

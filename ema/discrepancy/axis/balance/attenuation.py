@@ -12,30 +12,19 @@ American Statistical Association 89, 1994.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ema.core.records import Array
-
 from .course import Course
-from .regression import Plain, Regression, fitted
-from .rows import rows
+from .integrated import rows
+from .regression import Corrected, Plain, Regression, fitted
 
 if TYPE_CHECKING:
     from ema.discrepancy.axis.measured import Measured
 
 N_DRAWS = 4
 UNSURE = 0.5  # of the correction, as its standard deviation
-
-
-@dataclass(frozen=True)
-class Corrected:
-    """Coefficients, shape (n,), and their covariance, shape (n, n)."""
-
-    coefficients: Array
-    covariance: Array
 
 
 def attenuation(

@@ -9,11 +9,10 @@ import numpy as np
 from ema.core.records import Array
 
 from .along import LINES
-from .attenuation import Corrected
 from .found import Balance, Term
-from .law import Law
+from .law import BY_RECORD, BY_RECORD_NAME, Law
 from .links import LINKS
-from .regression import BY_RECORD, Plain, Regression, fitted
+from .regression import Corrected, Plain, Regression, fitted
 from .rows import Rows
 
 MOST_LAWS = 8
@@ -21,7 +20,6 @@ CLEAR = 3.0  # deviations over blocks by which a law must foretell held-out bloc
 MATTERS = 0.1  # share of what is left that a law must take
 LEAST = 3e-4  # share of the drive's torque in power that a law must take
 SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
-BY_NAME = BY_RECORD.replace(" ", "_")
 N_DRAWS = 400  # of blocks, to see how often a law wins
 
 
@@ -150,10 +148,10 @@ def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequenc
     same = [fitted(found, plain, _with(without, _best(found, without, own))) for own in siblings.values()]
     rivals: dict[str, Array] = {}
     for r in [*others, *same]:
-        own = r.laws[-1].name.removesuffix(BY_NAME)
+        own = r.laws[-1].name.removesuffix(BY_RECORD_NAME)
         if law.family in _held(r.laws[-1].family) and not _is_needed(r, model, 0.0):
             continue  # it can do what this law does and more, and need not
-        if own != law.name.removesuffix(BY_NAME) and (own not in rivals or r.loss < float(rivals[own].sum())):
+        if own != law.name.removesuffix(BY_RECORD_NAME) and (own not in rivals or r.loss < float(rivals[own].sum())):
             rivals[own] = r.losses
     names, losses = [law.name, *rivals], np.stack([model.losses, *rivals.values()])
     rng = np.random.default_rng(0)

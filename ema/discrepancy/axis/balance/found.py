@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .agreement import Agreement, against
-from .attenuation import Corrected
 from .law import Law
-from .regression import Plain, Regression
+from .regression import Corrected, Plain, Regression
 
 
 @dataclass(frozen=True)

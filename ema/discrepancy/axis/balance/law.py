@@ -22,6 +22,9 @@ class Acting:
     held: Array
 
 
+BY_RECORD = " by record"  # in family and key of what is fitted once for each
+BY_RECORD_NAME = "_by_record"  # in its name
+
 Columns = Callable[[Motion, Acting], tuple[Array, ...]]
 Values = Callable[[Array], Mapping[str, float]]
 

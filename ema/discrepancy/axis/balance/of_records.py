@@ -16,12 +16,13 @@ from .attenuation import attenuation
 from .choice import chosen
 from .course import Course, courses
 from .found import Balance
+from .integrated import rows
 from .law import Acting, Law
 from .laws import laws
 from .links import links
 from .own_zeros import with_zeros
 from .regression import Plain, Regression, fitted
-from .rows import Rows, rows
+from .rows import Rows
 from .units import LINEAR, ROTARY, of_base
 from .widths import LONGEST, STILL, half_widths
 

@@ -14,9 +14,9 @@ from ema.discrepancy.axis.zeros import between
 
 from .apart import by_record
 from .course import Course
+from .integrated import rows
 from .laws import laws
 from .regression import Plain, fitted
-from .rows import rows
 
 if TYPE_CHECKING:
     from ema.discrepancy.axis.measured import Measured

@@ -9,12 +9,12 @@ import numpy as np
 
 from ema.core.records import Array
 
-from .law import Acting, Law
-from .rows import N_FOLDS, Rows
+from .law import BY_RECORD, Acting, Law
+from .rows import Rows
 
 LEAST = 1e-8  # of the largest eigenvalue, below which a direction rests on the block that is left out alone
 N_ROUNDS = 6  # of laws that depend on what else acts, which depends on them
-BY_RECORD = " by record"  # in the name of what is fitted once for each
+N_FOLDS = 4  # interleaved: each holds out every fourth block
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,14 @@ class Plain:
     F_d: float
     C: float
     k_t: float = 1.0
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """Coefficients, shape (n,), and their covariance, shape (n, n)."""
+
+    coefficients: Array
+    covariance: Array
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from ema.core.records import Array
 from ema.discrepancy.axis.linear import in_metres
 
 from .agreement import Agreement
-from .regression import BY_RECORD
+from .law import BY_RECORD
 
 N_DRAWS = 400
 INTERVAL = (2.5, 97.5)  # percent
