@@ -23,11 +23,11 @@ def demo(out: Path, bus: str, n_cycles: int | None) -> None:
     Example:
       ema demo --out ema-demo
     """
-    from rich.console import Console
+    from ema.core import terminal
 
     from . import chain, plot, results, stage
 
-    console = Console(stderr=True)
+    console = terminal.console(stderr=True)
     files = stage.Files(out)
     files.prepare()
     chain.make_bundle(files, console)
@@ -40,7 +40,7 @@ def demo(out: Path, bus: str, n_cycles: int | None) -> None:
     results.write_table(files, flight)
     plot.write(files.plot, flight)
     chain.make_report(files, console)
-    Console().print(results.table(flight))
+    terminal.console().print(results.table(flight))
     click.echo(f"replayed: all {n_same} estimates of the log are the same again, bit for bit")
     for path, meaning in files.made():
         click.echo(f"{meaning:<12} {path}")

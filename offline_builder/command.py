@@ -29,9 +29,9 @@ def build(
       ema build --config config/builder.yaml --out bundle --scheduler tcp://10.0.0.1:8786
       ema build --config config/builder.yaml --out bundle --sign builder.pem
     """
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+    from ema.core import terminal
     from ema.core.signatures import load_private
 
     from . import build as phase
@@ -39,7 +39,7 @@ def build(
 
     key = None if key_path is None else load_private(key_path)
     builder, plant = phase.read(config_path)
-    console = Console(stderr=True)
+    console = terminal.console(stderr=True)
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
     )

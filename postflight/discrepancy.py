@@ -106,9 +106,7 @@ def _examined(
     """The findings, written into `files`; interrupted, what is known by then."""
     from importlib import import_module
 
-    from rich.console import Console
-
-    from ema.core import config
+    from ema.core import config, terminal
     from ema.discrepancy.extended import write_extended
     from ema.discrepancy.progress import Progress
     from ema.discrepancy.report import write_report
@@ -116,7 +114,7 @@ def _examined(
     findings_file, report, extended = files
     name = str(config.read_yaml(plant_file).get("name", plant_file.stem))
     records = [str(path) for path in given]
-    console = Console(stderr=True)
+    console = terminal.console(stderr=True)
     with console.status("simulating") as status:
 
         def say(text: str) -> None:
