@@ -36,7 +36,7 @@ def trial(t: strata_axis.Trial, threads: int) -> dict[str, Any]:
     model = LinearAxis if t.plant_file.get("motion") == "linear" else RotaryAxis
     begun = time.process_time()
     try:
-        plant = AxisPlant(model.model_validate(t.plant_file), [t.record], n_threads=threads)
+        plant = AxisPlant(model.model_validate(t.plant_file), t.records, n_threads=threads)
         found = findings(plant, examined(plant))
     except RecordError as error:
         return {**told, "outcome": "refused", "said": [str(error)]}
@@ -59,8 +59,9 @@ def outcome(t: strata_axis.Trial, found: Findings) -> str:
     """How the finder did: right, in set, wrong, missed."""
     sets = [{e.name, *e.indistinguishable_from} for e in found.effects]
     wanted = set(t.effects)
-    if not wanted and t.case in strata_axis.OUTSIDE:
-        said = "right" if found.verdict == "unexplained" and not sets else "wrong"
+    if not wanted and t.kind in strata_axis.OUTSIDE:
+        is_near = bool(sets) and all(s & set(t.near) for s in sets)
+        said = "right" if is_near or (found.verdict == "unexplained" and not sets) else "wrong"
         return "missed" if found.verdict == "adequate" else said
     if not wanted:
         return "right" if found.verdict == "adequate" else "wrong"

@@ -9,15 +9,25 @@ from typing import Any
 
 import axis_bench
 import axis_other
+import geared
 import hidden_axis
 import numpy as np
 import positioner
 import servo
+import strange
 
+from benchmarks import strata_laws
 from ema.core.records import Array, Cycle, Record
 
 EFFECTS = list(hidden_axis.LIBRARY)
-OUTSIDE = list(hidden_axis.OUTSIDE)
+OUTSIDE = [*hidden_axis.OUTSIDE, *(kind for kind in strange.KINDS if kind != "nothing")]
+# Effects of the library that act like what is outside it, so that naming them is the right place.
+NEAR = {
+    "cushion": ("spring_load",), "gap": ("gear_compliance",), "maxwell_slip": ("friction_memory",),
+    "heat": ("friction_drift",), "clutch": ("gear_compliance",), "current_lag": ("speed_delay", "position_delay"),
+    "one_way_fan": ("quadratic_drag", "viscous_by_direction"), "load_step": ("constant_load",),
+    "one_sided_driver": ("drive_unequal", "drive_gain", "magnet_flux"),
+}  # fmt: skip
 # Torque, inertia beyond that, inductance and resistance over those of tests/support/axis_bench.py.
 PLANTS = {"small": (1.0, 1.0, 1.0, 1.0), "strong": (5.0, 2.5, 3.0, 1.5), "tiny": (0.25, 0.5, 0.4, 2.0)}
 TORQUE = {("viscous_drag", "coefficient"), ("quadratic_drag", "coefficient"), ("cogging", "amplitude"),
@@ -27,19 +37,30 @@ TORQUE = {("viscous_drag", "coefficient"), ("quadratic_drag", "coefficient"), ("
 EXACT = {"cogging.amplitude", "asymmetric_friction.asymmetry", "constant_load.torque", "magnet_flux.change",
          "winding_resistance.change", "inverter_drop.voltage", "speed_delay.time", "position_delay.time",
          "clock_skew.rate", "inertia.change", "drive_gain.gain", "drive_offset.offset",
-         "viscous_by_direction.difference"}  # fmt: skip
+         "viscous_by_direction.difference", "output_load_friction.share", "pendulum.amplitude",
+         "quadratic_load_friction.per_square", "quadratic_output_load_friction.per_torque", "friction_drift.rate",
+         "viscous_drift.rate", "gear_error.amplitude", "external_torque.amplitude"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One record with its plant file; `effects` are those hidden, of the library's, and `truth` their exact values."""
+    """Records with their plant file; `effects` are those hidden, of the library's, and `truth` their exact values.
+
+    `near`: effects of the library that act like what is hidden and is none of them.
+    """
 
     case: str
     plant: str
     plant_file: dict[str, Any]
-    record: Record
+    records: tuple[Record, ...]
     effects: tuple[str, ...]
     truth: dict[str, float]
+    near: tuple[str, ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """What is hidden."""
+        return self.case.split(",")[0]
 
 
 def _bench(names: list[str], seed: int, plant: str) -> Trial:
@@ -64,7 +85,8 @@ def _bench(names: list[str], seed: int, plant: str) -> Trial:
     }
     record = axis_bench.record(bench, rng, motions=motions)
     library = tuple(name for name in names if name in hidden_axis.LIBRARY)
-    return Trial("+".join(names) or "nothing", plant, {**plant_file, **told}, record, library, truth)
+    case = "+".join(names) or "nothing"
+    return Trial(case, plant, {**plant_file, **told}, (record,), library, truth, NEAR.get(case, ()))
 
 
 def _nothing(number: int, seed: int, plant: str) -> Trial:
@@ -79,8 +101,40 @@ def _two(number: int, seed: int, plant: str) -> Trial:
     return _bench(Random(seed).sample(EFFECTS, 2), seed, plant)
 
 
+def _three(number: int, seed: int, plant: str) -> Trial:
+    return _bench(Random(seed).sample(EFFECTS, 3), seed, plant)
+
+
 def _outside(number: int, seed: int, plant: str) -> Trial:
-    return _bench([OUTSIDE[number % len(OUTSIDE)]], seed, plant)
+    kind = OUTSIDE[number % len(OUTSIDE)]
+    if kind in hidden_axis.OUTSIDE:
+        return _bench([kind], seed, plant)
+    torque, heavier, *_ = PLANTS[plant]
+    d = strange.Axis()
+    axis = replace(d, J=d.J * torque * heavier, F=d.F * torque, C=d.C * torque, k_t=d.k_t * torque)
+    record = strange.record(kind, axis, seed % 100_000, stiff=heavier)
+    return Trial(kind, plant, strange.plant(axis), (record,), (), {}, NEAR.get(kind, ()))
+
+
+def _law(number: int, seed: int, plant: str) -> Trial:
+    """A law of a warm, geared, compliant axis, or none, under cascaded loops."""
+    rng = np.random.default_rng(seed)
+    torque, heavier, *_ = PLANTS[plant]
+    d = geared.Axis()
+    axis = replace(
+        d, J=d.J * torque * heavier * rng.uniform(0.7, 1.4), F=d.F * torque * rng.uniform(0.7, 1.4), C=d.C * torque,
+        k_t=d.k_t * torque,
+    )  # fmt: skip
+    kinds = [*strata_laws.HIDDEN, "nothing"]
+    name = kinds[number % len(kinds)]
+    h = strata_laws.Hidden(axis) if name == "nothing" else strata_laws.hidden(name, axis, rng)
+    size, loop = rng.uniform(0.7, 1.4), (40.0, 0.05 * heavier)
+    records = tuple(
+        h.spoil(geared.record(a, seed % 100_000 + k, seconds=8.0, size=size, temperature=h.is_warm, loop=loop))
+        for k, a in enumerate((h.axis, *h.others))
+    )
+    told = {k: v for k, v in {**geared.plant(h.axis), **h.plant_file}.items() if v is not None}
+    return Trial(f"{name}, cascade", plant, told, records, h.effects, dict(h.truth))
 
 
 def _spoiled(number: int, seed: int, plant: str) -> Trial:
@@ -88,14 +142,22 @@ def _spoiled(number: int, seed: int, plant: str) -> Trial:
     how = list(SPOIL)[number % len(SPOIL)]
     names = [EFFECTS[Random(seed).randrange(len(EFFECTS))]] if number // len(SPOIL) % 2 else []
     t = _bench(names, seed, plant)
-    record = Record(tuple(SPOIL[how](c) for c in t.record))
+    record = Record(tuple(SPOIL[how](c) for c in t.records[0].cycles[: 2 if how == "short" else None]))
     return replace(
-        t, case=f"{t.case}, {how}", record=record, plant_file={k: v for k, v in t.plant_file.items() if k != "noise"}
-    )
+        t, case=f"{t.case}, {how}", records=(record,),
+        plant_file={k: v for k, v in t.plant_file.items() if k != "noise"},
+    )  # fmt: skip
 
 
 def _each(change: Callable[[str, Array], Array]) -> Callable[[Cycle], Cycle]:
     return lambda c: Cycle(c.number, {name: change(name, x) for name, x in c.channels.items()})
+
+
+def _jittery(c: Cycle) -> Cycle:
+    """Stamped by a clock that counts in steps of a third of a sample."""
+    step = c.period / 3.0
+    late = np.random.default_rng(c.n_samples).uniform(0.0, 0.6, c.n_samples) * c.period
+    return Cycle(c.number, {**c.channels, "t": np.floor((c["t"] + late) / step) * step})
 
 
 SPOIL: dict[str, Callable[[Cycle], Cycle]] = {
@@ -103,6 +165,9 @@ SPOIL: dict[str, Callable[[Cycle], Cycle]] = {
     "clipped": _each(lambda name, x: np.clip(x, *np.quantile(x, [0.01, 0.99])) if name == "i_q" else x),
     "gappy": _each(lambda name, x: np.delete(x, np.s_[600:640])),
     "slow": _each(lambda name, x: x[::4]),
+    "short": _each(lambda name, x: x[: len(x) // 2]),
+    "repeating": _each(lambda name, x: x if name == "t" else np.where(np.arange(len(x)) % 97 == 5, np.roll(x, 1), x)),
+    "jittery": _jittery,
 }
 
 
@@ -122,7 +187,7 @@ def _other(number: int, seed: int, plant: str) -> Trial:
         effects, truth = ["asymmetric_friction"], {"asymmetric_friction.asymmetry": hidden[axis_other.ASYMMETRY]}
     record = axis_other.record(replace(setup, hidden=tuple(hidden)), seed % 100_000)
     case = "+".join(effects) or "nothing"
-    return Trial(f"{case}, {name}", name, dict(axis_other.plant(setup)), record, tuple(effects), truth)
+    return Trial(f"{case}, {name}", name, dict(axis_other.plant(setup)), (record,), tuple(effects), truth)
 
 
 def _loops(number: int, seed: int, plant: str) -> Trial:
@@ -135,29 +200,41 @@ def _loops(number: int, seed: int, plant: str) -> Trial:
         record = servo.record(s, samples=bool(rng.integers(2)), inertia=0.0085 * (1.0 + change))
         return _loop(kind, servo.SPEED_LOOP, record, {"inertia.change": change})
     if kind == "cascade":
-        table = positioner.Table(M=float(rng.uniform(40.0, 120.0)), F_d=float(rng.uniform(12.0, 25.0)))
-        d = float(rng.uniform(15.0, 40.0)) * (number // 3 % 2)
-        table = replace(table, C_positive=200.0 + d, C_negative=200.0 - d)
-        return _loop(
-            kind, positioner.table_plant(table), positioner.table(table, s), {"viscous_by_direction.difference": d}
-        )
+        return _cascade(number // 3, s, rng)
     bench = positioner.Servo(by_load=float(rng.uniform(0.1, 0.3)) * (number // 3 % 2))
     record = positioner.servo(bench, s)
     found = {"pendulum.amplitude": bench.gravity, "output_load_friction.share": bench.by_load}
     return _loop(kind, positioner.servo_plant(bench), record, found)
 
 
+def _cascade(number: int, s: int, rng: np.random.Generator) -> Trial:
+    """A positioning table, of three masses a factor of two apart."""
+    mass = float(rng.choice([30.0, 70.0, 160.0]))
+    table = positioner.Table(M=mass * float(rng.uniform(0.8, 1.25)), F_d=float(rng.uniform(12.0, 25.0)))
+    d, load, k = float(rng.uniform(15.0, 40.0)), float(rng.uniform(3.0, 8.0)), float(rng.uniform(60.0, 200.0))
+    kinds: list[tuple[dict[str, float], dict[str, float]]] = [
+        ({}, {}),
+        ({"C_positive": 200.0 + d, "C_negative": 200.0 - d}, {"viscous_by_direction.difference": d}),
+        ({"constant": load}, {"constant_load.torque": load}),
+        ({"spring": k}, {"spring_load.stiffness": k}),
+        ({"quadratic": 5.0 * d}, {"quadratic_drag.coefficient": 5.0 * d}),
+    ]
+    change, there = kinds[number % len(kinds)]
+    table = replace(table, **change)
+    return _loop("cascade", positioner.table_plant(table), positioner.table(table, s), there)
+
+
 def _loop(kind: str, plant_file: dict[str, Any], record: Record, values: dict[str, float]) -> Trial:
     there = {name: x for name, x in values.items() if x}
     effects = tuple(dict.fromkeys(name.split(".")[0] for name in there))
-    return Trial(f"{'+'.join(effects) or 'nothing'}, {kind}", kind, plant_file, record, effects, there)
+    return Trial(f"{'+'.join(effects) or 'nothing'}, {kind}", kind, plant_file, (record,), effects, there)
 
 
 # Shares of all trials, and what makes one.
 STRATA: dict[str, tuple[float, Callable[[int, int, str], Trial]]] = {
-    "nothing": (0.25, _nothing), "one effect": (0.33, _one), "two effects": (0.1, _two),
-    "outside the library": (0.1, _outside), "recorder": (0.06, _spoiled), "other makers": (0.08, _other),
-    "loops": (0.08, _loops),
+    "nothing": (0.15, _nothing), "one effect": (0.22, _one), "law, cascaded loops": (0.19, _law),
+    "two effects": (0.1, _two), "three effects": (0.05, _three), "outside the library": (0.08, _outside),
+    "recorder": (0.07, _spoiled), "other makers": (0.07, _other), "loops": (0.07, _loops),
 }  # fmt: skip
 
 

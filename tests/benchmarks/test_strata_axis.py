@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
 
-from benchmarks import frozen, strata_axis
+from benchmarks import frozen, strata_axis, strata_laws
 from ema.effects import registry
 
 HEAD = "a" * 40
@@ -20,7 +21,42 @@ def test_there_are_as_many_as_asked_for_and_every_effect_and_kind_has_its_turn()
     assert of["one effect"] >= 2 * len(strata_axis.EFFECTS)
     assert of["outside the library"] >= len(strata_axis.OUTSIDE)
     assert of["loops"] >= 6
+    assert of["law, cascaded loops"] > 2 * len(strata_laws.HIDDEN)
     assert {e for e in strata_axis.EFFECTS if e not in registry()} == set()
+
+
+def test_every_effect_that_an_axis_may_have_is_hidden_by_some_stratum():
+    """But those that are a set with another one wherever they act, or that a standstill map alone has."""
+    rng = np.random.default_rng(1)
+    laws = [strata_laws.hidden(name, strata_laws.geared.Axis(), rng) for name in strata_laws.HIDDEN]
+    effects = [h.effects for h in laws]
+    hidden = {*strata_axis.EFFECTS, *(e for some in effects for e in some), "viscous_by_direction"}
+    mine = {name for name, e in registry().items() if "axis" in e.plants}
+    assert mine - hidden == {"encoder_error"}
+    assert all(e in registry() for e in hidden)
+
+
+def test_a_dozen_kinds_are_outside_the_library_and_what_acts_like_them_is_in_it():
+    assert len(strata_axis.OUTSIDE) >= 12
+    assert not set(strata_axis.OUTSIDE) & set(registry())
+    assert all(e in registry() for near in strata_axis.NEAR.values() for e in near)
+
+
+@pytest.mark.parametrize("name", strata_laws.HIDDEN)
+def test_what_is_hidden_is_in_the_record(name):
+    """The record differs from that of the same axis and motion without the law: noise is the same in both."""
+    import geared
+
+    axis = geared.Axis()
+    h = strata_laws.hidden(name, axis, np.random.default_rng(1))
+    gravity = h.axis.gravity if "effects" in h.plant_file else 0.0
+    plain = replace(axis, C=h.axis.C, warms=h.axis.warms, gravity=gravity)
+    there = h.spoil(geared.record(h.others[0] if h.others else h.axis, 1, seconds=4.0)).cycles[0]
+    here = geared.record(plain, 1, seconds=4.0).cycles[0]
+    off = {"theta_m": there["theta_m"] - here["theta_m"], "w_m": there["w_m"] - here["w_m"]}
+    off["i_q"] = (there["torque"] / axis.k_t if "torque" in there else there["i_q"]) - here["i_q"]
+    noise = dict(zip(("theta_m", "w_m", "i_q"), axis.noise, strict=True))
+    assert max(np.sqrt(np.mean(x**2)) / noise[channel] for channel, x in off.items()) > 0.7
 
 
 def test_plants_differ_by_more_than_a_factor_of_two():
@@ -36,7 +72,7 @@ def test_the_plant_file_obeys_the_motion_that_it_is_given_with(name):
     seed = next(s for s in range(99) if list(strata_axis.PLANTS)[s % 3] == name)
     t = strata_axis.drawn("nothing", 0, seed)
     p = t.plant_file
-    c = max(t.record, key=lambda c: np.std(c["w_m"]))  # the fastest: noise of the speed counts least
+    c = max(t.records[0], key=lambda c: np.std(c["w_m"]))  # the fastest: noise of the speed counts least
     dt, w = c["t"][1], c["w_m"]
     torque, way = (np.cumsum(x) * dt for x in (p["k_t"] * c["i_q"] - p["C"] * w, np.sign(w)))
     by_torque, by_way, _ = np.linalg.lstsq(np.stack([torque, way, np.ones(len(w))], axis=1), w, rcond=None)[0]
@@ -48,4 +84,4 @@ def test_the_plant_file_obeys_the_motion_that_it_is_given_with(name):
 def test_the_same_seed_makes_the_same_trial():
     a, b = (strata_axis.drawn("two effects", 3, frozen.seed(HEAD, "two effects", 3)) for _ in range(2))
     assert (a.case, a.truth) == (b.case, b.truth)
-    np.testing.assert_array_equal(a.record.cycles[0]["i_q"], b.record.cycles[0]["i_q"])
+    np.testing.assert_array_equal(a.records[0].cycles[0]["i_q"], b.records[0].cycles[0]["i_q"])

@@ -32,6 +32,12 @@ class Axis:
     viscous_rate: float = 0.0  # [1/s] of C
     flux_per_kelvin: float = 0.0  # [1/K] of the torque constant
     by_square: float = 0.0  # [1/(N m)] friction over motor torque squared
+    gravity: float = 0.0  # [N m] of a load that hangs at the shaft, at the horizontal
+    by_load: float = 0.0  # friction over that load
+    by_load_square: float = 0.0  # [1/(N m)] and over its square
+    dry_slope: float = 0.0  # [1/rad] of F along the travel
+    viscous_slope: float = 0.0  # [1/rad] of C
+    unequal: float = 0.0  # share by which the drive gives more one way, and less the other
     lines: tuple[tuple[float, float, float], ...] = ()  # amplitude [N m], order per motor turn, phase
     reads: float = 1.0  # recorded current over the true one
     warms: tuple[float, float, float] = (20.0, 20.0, 4.0)  # [°C] from, to, [s] with this time constant
@@ -40,8 +46,10 @@ class Axis:
 
 
 @njit(cache=False)
-def _run(reference, hz, p, warm, lines, loop, out):
-    J, F, C, k_t, bristle, dry_k, activation, dry_rate, viscous_rate, by_square, flux = p
+def _run(reference, hz, p, of_load, along, warm, lines, loop, out):
+    J, F, C, k_t, bristle, dry_k, activation, dry_rate, viscous_rate, by_square, flux, unequal = p
+    gravity, by_load, by_load_square = of_load
+    dry_slope, viscous_slope = along
     K_p, K_w = loop
     theta, w, z = reference[0], 0.0, 0.0
     dt = 1.0 / (hz * FINE)
@@ -54,11 +62,13 @@ def _run(reference, hz, p, warm, lines, loop, out):
         drag = C * (1.0 + viscous_rate * t) * np.exp(activation * (1.0 / kelvin - 1.0 / 293.15))
         dry = F * (1.0 + dry_rate * t) * np.exp(-dry_k * (warm[k] - 20.0))
         for _ in range(FINE):
-            motor = k_t * (1.0 + flux * (warm[k] - 20.0)) * i
-            other = drag * w
+            motor = k_t * (1.0 + flux * (warm[k] - 20.0) + unequal * np.sign(i)) * i
+            load = gravity * np.sin(theta)
+            other = drag * (1.0 + viscous_slope * theta) * w + load
             for n in range(lines.shape[0]):
                 other += lines[n, 0] * np.sin(lines[n, 1] * theta + lines[n, 2])
-            rubs = dry + by_square * motor * motor
+            rubs = dry * (1.0 + dry_slope * theta) + by_square * motor * motor
+            rubs += by_load * abs(load) + by_load_square * load * load
             if bristle > 0.0:
                 stiff = rubs / bristle
                 dz = w - abs(w) * z / bristle
@@ -88,9 +98,10 @@ def record(
     out = np.empty((3, n))
     p = (
         *(axis.J, axis.F, axis.C, axis.k_t, axis.bristle, axis.dry_per_kelvin, axis.viscous_activation),
-        *(axis.dry_rate, axis.viscous_rate, axis.by_square, axis.flux_per_kelvin),
+        *(axis.dry_rate, axis.viscous_rate, axis.by_square, axis.flux_per_kelvin, axis.unequal),
     )
-    _run(reference, axis.hz, p, warm, np.array(axis.lines, float).reshape(-1, 3), loop, out)
+    of_load, along = (axis.gravity, axis.by_load, axis.by_load_square), (axis.dry_slope, axis.viscous_slope)
+    _run(reference, axis.hz, p, of_load, along, warm, np.array(axis.lines, float).reshape(-1, 3), loop, out)
     theta, w, i = (x + s * rng.standard_normal(n) for x, s in zip(out, axis.noise, strict=True))
     channels = {"t": t, "theta_m": theta, "w_m": w, "i_q": axis.reads * i}
     if temperature:
