@@ -76,7 +76,7 @@ class _Apart:
     alone : int or None
         The record that differs from all others, which agree.
     is_shift : bool
-        Whether another zero of the angle would do: the line is of one size everywhere.
+        Whether another zero of the angle would do: the line is of one size everywhere, and the others go with it.
     """
 
     order: float
@@ -93,14 +93,15 @@ def _apart(plant: AxisPlant) -> list[_Apart]:
     b = plant.balance
     if b is None or len(plant.benches) < 2 or not _torque_of(plant):
         return []
-    records = b.model.rows.motion.records
+    records, turned = b.model.rows.motion.records, plant.zeros.values()
     out = []
     for a in b.agreements:
         if a.name != "cogging" or a.law is None or a.is_one(len(b.agreements)):
             continue
         order = a.law.values(a.values.ravel())["order"]
         differs = 1.0 - min(a.odds, 0.5)
-        out.append(_Apart(order, records, a.values, a.covariance, differs, _alone(a), _is_shift(a)))
+        is_shift = _is_shift(a) and not any(order in zero.turned and zero.instead is None for zero in turned)
+        out.append(_Apart(order, records, a.values, a.covariance, differs, _alone(a), is_shift))
     return out
 
 

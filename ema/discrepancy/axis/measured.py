@@ -21,13 +21,13 @@ class Zero:
     """Angle to be added to the positions of a record, found by lines of `orders`; None where nothing tells. [rad]
 
     `turned`: lines that have the other sign in this record while the zero is the same; a zero that is `instead` off
-    would look alike.
+    would look alike, where there is one.
     """
 
     angle: float | None
     orders: tuple[float, ...] = ()
     turned: tuple[float, ...] = ()
-    instead: float = 0.0
+    instead: float | None = None
 
     @property
     def period(self) -> float:

@@ -158,7 +158,12 @@ def _zeros(plant: AxisPlant, outcome: Outcome) -> list[str]:
             orders = ", ".join(f"{n:g}" for n in zero.turned)
             out.append(
                 f"{name}: the torque of order {orders} has the other sign than in the records before, as by a "
-                f"neighbour's magnets or a current sensor; a zero {zero.instead:+.4g} rad off would look the same"
+                "neighbour's magnets or a current sensor; "
+                + (
+                    "no other zero of the angle turns these and leaves the rest"
+                    if zero.instead is None
+                    else f"a zero {zero.instead:+.4g} rad off would look the same"
+                )
             )
         elif zero.angle:
             orders = ", ".join(f"{n:g}" for n in zero.orders)

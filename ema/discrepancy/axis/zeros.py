@@ -62,9 +62,20 @@ def between(reference: dict[float, complex], own: dict[float, complex]) -> Zero:
     near = good[np.argmin(np.abs(delta[good]))]
     peak = good[np.abs(delta[good] - delta[near]) < math.pi / n.max()]
     found = float(delta[peak[np.argmax(overlap[peak])]])
-    shift = np.angle(np.exp(1j * n * found))
-    away = np.minimum(np.abs(shift), math.pi - np.abs(shift))
-    if bool((away < TURNED).all()):  # by chance in few zeros of all, but in each where a neighbour turns lines round
-        turned = tuple(float(k) for k in n[np.abs(shift) > 0.5 * math.pi])
-        return Zero(0.0, shared, turned, found)
+    if (turned := _turned(shared, products)) is not None:
+        does = overlap.max() >= SAME * np.abs(products).sum()  # one zero moves all lines, each by its order
+        return Zero(0.0, shared, turned, found if does else None)
     return Zero(found, shared)
+
+
+def _turned(shared: tuple[float, ...], products: Array) -> tuple[float, ...] | None:
+    """Lines that have the other sign, where each line that matters lies as it does or just turned round; else None.
+
+    By chance that is so in few zeros of all, and it is in each record where a neighbour turns some lines round.
+    """
+    size = np.abs(products)
+    weighty = size > (1.0 - SAME) * size.max()
+    phase = np.abs(np.angle(products))
+    if bool((np.minimum(phase, math.pi - phase)[weighty] > TURNED).any()):
+        return None
+    return tuple(n for n, counts, off in zip(shared, weighty, phase, strict=True) if counts and off > 0.5 * math.pi)

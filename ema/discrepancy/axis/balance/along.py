@@ -15,6 +15,8 @@ from .units import Units
 N_PLACES, N_ORDERS = 12, 320  # members of a family
 LEAST_TURN = 0.3  # [rad] of travel that shows a sine of the angle apart from a straight line
 HIGHEST_ORDER = 260.0
+FEWEST_PERIODS = 2.0  # of a line within the travel
+CLOSED = 0.1  # of a period: a map of one turn ends a step before it begins
 STRETCHES = (0.05, 0.15)  # half widths of a stretch of other friction, of the travel
 TORQUE_LINE, TRAVEL_LINE, GEAR_LINE = "torque line", "line along the travel", "line of the gear"
 LINES = tuple(  # several may act
@@ -155,10 +157,9 @@ def _gear_lines(m: Motion, span: float, u: Units) -> Iterator[Law]:
 
 def _lines(span: float, u: Units, *, linear: bool, but: tuple[float, ...]) -> Iterator[Law]:
     resolution = 2.0 * np.pi / span
-    step = resolution if linear else max(1.0, float(np.ceil(resolution)))
-    if not linear and span <= 2.0 * np.pi:
-        return
-    for n in np.arange(2.0 * (resolution if linear else 1.0), min(HIGHEST_ORDER * step, step * N_ORDERS), step):
+    step = resolution if linear else 1.0  # a torque locked to a rotor closes after a turn
+    lowest = FEWEST_PERIODS * resolution if linear else max(2.0, float(np.ceil(FEWEST_PERIODS * resolution - CLOSED)))
+    for n in np.arange(lowest, min(HIGHEST_ORDER * step, lowest + step * N_ORDERS), step):
         if n in but:
             continue  # stands among the gear's
         periods = f"once in {2.0 * np.pi / n:.3g} m of travel" if linear else "with {order:.4g} periods per turn"
