@@ -21,6 +21,7 @@ import click
 import numpy as np
 
 from benchmarks.frozen import commit
+from benchmarks.kernel import BEST_LANES
 from ema.core import config, resources
 from ema.core.names import FAULTS
 from ema.core.records import Record, read_record
@@ -29,6 +30,7 @@ from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.examine import examine
 from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.problem import ActuatorProblem
+from ema.discrepancy.actuator.runs import Work
 from ema.discrepancy.engine.search import Search
 from ema.discrepancy.engine.weighing import Budget
 from ema.discrepancy.progress import Progress
@@ -51,16 +53,24 @@ def record(name: str) -> Record:
         return read_record(path)
 
 
+def costs(work: Work, cpu_s: float) -> dict[str, Any]:
+    """What an answer took: runs asked for and simulated, processor time, and that over what full lanes would take."""
+    limit = 1e-9 * BEST_LANES * work.steps
+    return {"asked": work.asked, "runs": work.simulated, "cpu_s": cpu_s, "times_limit": cpu_s / limit}
+
+
 def examined(name: str, n_threads: int) -> dict[str, Any]:
     """The findings on one record, with the truth and what it cost."""
     plant = config.load(resources.config("actuator.yaml"), Actuator)
     begun = time.process_time()
-    findings = examine(
+    examination = examine(
         plant,
         measured(plant, [record(name)]),
         n_threads=n_threads,
         say=Progress(lambda t: click.echo(f"  {t}", err=True)),
-    ).findings
+    )
+    cost = costs(examination.search.plant.work, time.process_time() - begun)
+    findings = examination.findings
     said = findings.as_dict()
     gain = said["gain"]
     return {
@@ -71,7 +81,7 @@ def examined(name: str, n_threads: int) -> dict[str, Any]:
             for e in findings.effects
         ],
         "heldout": gain["heldout"], "k": gain["k_after"], "sentences": findings.sentences(), "notes": findings.notes,
-        "cpu_s": time.process_time() - begun,
+        **cost,
     }  # fmt: skip
 
 
@@ -98,7 +108,7 @@ def looked_at(name: str, n_threads: int) -> dict[str, Any]:
         "error_nats": answer.posterior[0].error, "p_value": answer.p_value,
         "fitted": {n: [m, sd] for n, m, sd in fitted},
         "rejected": answer.rejected, "mean_square_of_truth": of_truth, "mean_square_of_fit": of_fit,
-        "runs": problem.plant.n_runs, "cpu_s": time.process_time() - begun,
+        **costs(problem.plant.work, time.process_time() - begun),
     }  # fmt: skip
 
 
@@ -115,7 +125,9 @@ def main(names: tuple[str, ...], finder: str, threads: int, out: Path) -> None:
         with out.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row, ensure_ascii=False) + "\n")
         said = row["posterior"][:3] if finder == "engine" else [row["verdict"], *(e["name"] for e in row["effects"])]
-        click.echo(f"{name}: {said}; {row['cpu_s']:.0f} s")
+        click.echo(
+            f"{name}: {said}; {row['cpu_s']:.0f} s, {row['runs']} runs, {row['times_limit']:.1f} × the kernel's limit"
+        )
 
 
 if __name__ == "__main__":

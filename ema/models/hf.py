@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import compress
@@ -117,10 +117,11 @@ def simulate(
     command = np.broadcast_to(np.atleast_2d(command), (n, np.shape(command)[-1]))
     n_recorded = command.shape[1]
     start = cold_start(plant, n) if start is None else np.broadcast_to(np.atleast_2d(start), (n, N_STATE))
-    lvdt_noise, current_noise = _noise(plant, np.broadcast_to(seeds, (n,)) if noise else [], n, n_recorded)
+    lvdt_noise, current_noise = _noise(plant, np.broadcast_to(seeds, (n,)) if noise else np.empty(0), n, n_recorded)
 
     z = parameters(plant, k, merged, dT)
     active = np.array([_is_active(z, name) for name in merged]).reshape(len(merged), n)
+    acts_in = np.array([parts.needed(list(compress(merged, of_run))) for of_run in active.T])
     z[:N_STATE] = start.T
     shared = z[row("clock_skew.shared")].copy()  # batches write to z
     clocks = z[[row(f"clock_skew.{name}") for name in ("rate", "currents", "late")]].T.copy()
@@ -146,15 +147,15 @@ def simulate(
             dt * (1.0 + shared[runs[0]]),
             n_substeps,
             (0,) * n_lanes,
-            (0,) * parts.needed(list(compress(merged, active[:, runs[0]]))),
+            (0,) * int(acts_in[runs[0]]),
             (0,) * audited,
         )
         z[:, runs] = zb.reshape(N_ROWS, n_lanes)[:, : len(runs)]
         for run, channels in zip(runs, ob.transpose(2, 0, 1), strict=False):
             out[run] = _sampled(channels, t, clocks[run]) if clocks[run].any() else channels
 
-    of, kinds = np.unique(np.stack([shared, beyond, *active]), axis=1, return_inverse=True)
-    alike = [np.flatnonzero(kinds.ravel() == kind) for kind in range(of.shape[1])]  # equations, steps, length of a step
+    of, kinds = np.unique(np.stack([shared, beyond, acts_in]), axis=1, return_inverse=True)
+    alike = [np.flatnonzero(kinds.ravel() == kind) for kind in range(of.shape[1])]  # length of a step, steps, equations
     batches = [runs[first : first + n_lanes] for runs in alike for first in range(0, len(runs), n_lanes)]
     if n_threads > 1 and len(batches) > 1:
         with ThreadPoolExecutor(n_threads) as pool:
@@ -198,15 +199,14 @@ def _substeps(T: float, dt: float) -> int:
     return n
 
 
-def _noise(
-    plant: Actuator, seeds: np.ndarray | Sequence[int], n: int, n_recorded: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _noise(plant: Actuator, seeds: np.ndarray, n: int, n_recorded: int) -> tuple[np.ndarray, np.ndarray]:
     """Noise of the LVDT (n, n_recorded) [rad] and of the currents (n, 3, n_recorded) [A]; none without seeds."""
     lvdt, current = np.zeros((n, n_recorded)), np.zeros((n, 3, n_recorded))
-    for run, seed in enumerate(seeds):
+    for seed in np.unique(seeds):
         rng = np.random.default_rng(int(seed))
-        lvdt[run] = plant.sensors.lvdt_noise * rng.standard_normal(n_recorded)
-        current[run] = plant.sensors.current_noise * rng.standard_normal((3, n_recorded))
+        alike = np.flatnonzero(seeds == seed)
+        lvdt[alike] = plant.sensors.lvdt_noise * rng.standard_normal(n_recorded)
+        current[alike] = plant.sensors.current_noise * rng.standard_normal((3, n_recorded))
     return lvdt, current
 
 

@@ -14,6 +14,7 @@ from ema.discrepancy.engine.statistic import shrunk_correlation
 from .cycles import Measured
 from .features import Array
 from .plant import EmaPlant, Point
+from .runs import Runs
 from .thinning import spread
 
 N_RUNS = 96, 48  # for the covariance, for the null distribution
@@ -57,18 +58,37 @@ def whitened(L: Array, x: Array) -> Array:
     return np.asarray(solve_triangular(L, np.atleast_2d(x).T, lower=True, check_finite=False).T.reshape(np.shape(x)))
 
 
-def motion_noise(plant: EmaPlant, point: Point, motion: int, n_runs: tuple[int, int] = N_RUNS) -> MotionNoise:
-    """Simulate cycles of a motion many times and describe how runs of one cycle differ.
+def _repeats(plant: EmaPlant, motion: int, n_runs: tuple[int, int]) -> tuple[list[int], int]:
+    """Cycles of a motion that are simulated for its noise, and how often each."""
+    cycles: list[int] = spread(np.flatnonzero(plant.data.motion == motion), N_CYCLES).tolist()
+    return cycles, -(-sum(n_runs) // len(cycles))
+
+
+def _simulated(plant: EmaPlant, point: Point, n_runs: tuple[int, int]) -> list[Runs]:
+    """Runs of every motion, cycle by cycle: motions that last as long share batches of lanes."""
+    repeats = [_repeats(plant, motion, n_runs) for motion in range(plant.n_motions)]
+    found: dict[int, Runs] = {}
+    for length in {len(command) for command in plant.data.commands}:
+        same = [m for m, command in enumerate(plant.data.commands) if len(command) == length]
+        of = {m: np.repeat(repeats[m][0], repeats[m][1]).tolist() for m in same}
+        cycles = [c for m in same for c in of[m]]
+        seeds = [seed for m in same for seed in range(SEED, SEED + len(of[m]))]
+        runs = plant.simulate([point] * len(cycles), cycles, seeds, steps=plant.noise_steps)
+        ends = np.cumsum([len(of[m]) for m in same])[:-1]
+        parts = zip(np.split(runs.features, ends), np.split(runs.envelopes, ends), strict=True)
+        found |= {m: Runs(*part) for m, part in zip(same, parts, strict=True)}
+    return [found[m] for m in range(plant.n_motions)]
+
+
+def motion_noise(plant: EmaPlant, motion: int, runs: Runs, n_runs: tuple[int, int]) -> MotionNoise:
+    """How runs of one cycle of a motion differ.
 
     Beside what is random stands what no record tells: the grid on which the comparators are evaluated. It rounds every
     switching instant, which shifts local means of the current by up to a quarter of (slope × step), alike in every run
     with this step. So runs have several steps, and what the step makes is part of the noise.
     """
-    cycles = spread(np.flatnonzero(plant.data.motion == motion), N_CYCLES)
-    each = -(-sum(n_runs) // len(cycles))
-    of = np.repeat(cycles, each)
-    n = len(of)
-    runs = plant.simulate([point] * n, of.tolist(), range(SEED, SEED + n), steps=plant.noise_steps)
+    cycles, each = _repeats(plant, motion, n_runs)
+    n = len(runs.features)
     floor = plant.floors[motion] * np.random.default_rng(SEED).standard_normal((n, len(plant.floors[motion])))
 
     def deviations(x: Array) -> Array:
@@ -91,7 +111,8 @@ class Noise:
 
     def __init__(self, plant: EmaPlant, point: Point, n_runs: tuple[int, int] = N_RUNS):
         self.plant, self.point = plant, dict(point)
-        self.motions = [motion_noise(plant, point, m, n_runs) for m in range(plant.n_motions)]
+        runs = _simulated(plant, point, n_runs)
+        self.motions = [motion_noise(plant, m, of, n_runs) for m, of in enumerate(runs)]
 
     def of(self, cycle: int) -> MotionNoise:
         """Noise of the motion a cycle belongs to."""

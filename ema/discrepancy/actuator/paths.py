@@ -52,7 +52,7 @@ def with_faults(search: Search, of_each: Array, point: Point) -> Search:
     mean = of_each.mean(axis=0)
     old = search.plant
     plant = EmaPlant(old.plant, replace(old.data, faults=of_each - mean), old.n_threads)
-    plant.late = old.late
+    plant.late, plant.work = old.late, old.work
     take_step(plant, old.step)
     noise = Noise(plant, {**point, **dict(zip(FAULTS, mean.tolist(), strict=True))})
     return Search(plant, noise, search.train, search.heldout, search.say)

@@ -6,9 +6,8 @@ neutral. What a simulation gives is random (switching, sensor noise), so predict
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -22,23 +21,15 @@ from ema.models.layout import STATE
 from .cycles import Measured
 from .features import Array, Signals, features, floors, slices, stacked
 from .gear import Resonance, resonance
+from .runs import Asked, Memory, Point, Runs, Work
 from .sampling import straightened
 
-Point = Mapping[str, float]
 Steps = tuple[float, ...] | None  # None: the plant's
 STEPS = (1e-6, 8e-7)  # [s] integration steps of a mean
 NOISE_STEPS = (1e-6, 5e-7, 8e-7, 2e-6)  # [s] integration steps of runs that tell the noise
 CHUNK = 64  # runs that a thread has in memory at a time
 CARRIED = 0.03  # [A] at the start, that tells that comparators are switching
 ENVELOPE_STEP = 10  # the envelope is low-passed at 200 Hz: every tenth sample says all
-
-
-@dataclass(frozen=True)
-class Runs:
-    """Simulated runs of one motion: features (n, n_features) and envelopes (n, n_times / ENVELOPE_STEP)."""
-
-    features: Array
-    envelopes: Array
 
 
 class EmaPlant:
@@ -53,7 +44,8 @@ class EmaPlant:
 
     def __init__(self, plant: Actuator, data: Measured, n_threads: int = 2):
         self.plant, self.data, self.n_threads = plant, data, n_threads
-        self.n_runs = 0
+        self.work = Work()
+        self.memory = Memory()
         self.step: float | None = None  # the one step that a record seems to have, where it was asked
         self.steps: tuple[float, ...] = STEPS
         self.noise_steps: tuple[float, ...] = NOISE_STEPS
@@ -90,26 +82,37 @@ class EmaPlant:
         Integration steps take turns with the seeds: what is rounded alike in every run with one step averages out.
         """
         steps = steps or self.steps
-        of = np.array([(seed - seeds[0]) % len(steps) for seed in seeds])
-        which = [np.flatnonzero(of == j) for j in range(len(steps))]
-        jobs = [
-            (w[at : at + CHUNK].tolist(), dt)
-            for w, dt in zip(which, steps, strict=True)
-            for at in range(0, len(w), CHUNK)
+        named = {id(point): self._not_neutral(point) for point in points}
+        asked = [
+            Asked(named[id(point)], cycle, seed, steps[(seed - seeds[0]) % len(steps)], self.late)
+            for point, cycle, seed in zip(points, cycles, seeds, strict=True)
         ]
-
-        def run(job: tuple[list[int], float]) -> Runs:
-            w, dt = job
-            return self._simulate([points[r] for r in w], [cycles[r] for r in w], [seeds[r] for r in w], dt)
-
+        new = sorted(self.memory.unknown(asked), key=lambda run: run.alike)
+        jobs = [
+            same[at : at + CHUNK]
+            for same in ([run for run in new if run.dt == dt] for dt in dict.fromkeys(steps))
+            for at in range(0, len(same), CHUNK)
+        ]
         # One step often fills one batch of lanes only, which takes one core: the steps run side by side.
         with ThreadPoolExecutor(self.n_threads) as pool:
-            parts = list(pool.map(run, jobs))
-        self.n_runs += len(seeds)
-        back = np.argsort(np.concatenate([w for w, _ in jobs]), kind="stable")
-        return Runs(
-            np.concatenate([p.features for p in parts])[back], np.concatenate([p.envelopes for p in parts])[back]
-        )
+            for job, runs in zip(jobs, pool.map(self._simulated, jobs), strict=True):
+                self.memory.keep(job, runs)
+        self.work.asked += len(asked)
+        self.work.simulated += len(new)
+        self.work.steps += sum(self._n_steps(run) for run in new)
+        return self.memory.recall(asked)
+
+    def _n_steps(self, run: Asked) -> int:
+        n_times = len(self.data.commands[self.data.motion[run.cycle]])
+        return (n_times - 1) * round(1.0 / (self.plant.control.rate * run.dt))
+
+    def _not_neutral(self, point: Point) -> frozenset[tuple[str, float]]:
+        return frozenset((name, float(x)) for name, x in point.items() if x != self.neutral(name))
+
+    def _simulated(self, runs: Sequence[Asked]) -> Runs:
+        """Runs with one integration step."""
+        points: list[Point] = [dict(run.point) for run in runs]
+        return self._simulate(points, [run.cycle for run in runs], [run.seed for run in runs], runs[0].dt)
 
     def _simulate(self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], dt: float) -> Runs:
         d = self.data
