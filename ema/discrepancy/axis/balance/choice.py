@@ -18,7 +18,7 @@ from .rows import Rows
 MOST_LAWS = 8
 CLEAR = 3.0  # deviations over blocks by which a law must foretell held-out blocks better
 MATTERS = 0.1  # share of what is left that a law must take
-LEAST = 3e-4  # share of the drive's torque in power that a law must take
+LEAST = 3e-4  # share of the drive's torque in power that a law must take, where more is left than it takes
 SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
 N_DRAWS = 400  # of blocks, to see how often a law wins
 
@@ -98,12 +98,23 @@ def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
 
 
 def _is_needed(new: Regression, old: Regression, whole: float) -> bool:
-    """Clearly better over blocks, by a share of what is left and of the drive's torque that matters."""
+    """Clearly better over blocks, by a share of what is left that matters, and of the drive's torque.
+
+    The latter since no law has quite the right form: beside a rest, what is small may be a part of it. That is no
+    doubt of a law that takes most of what is more than noise.
+    """
     d = old.losses - new.losses
     gain = float(d.sum())
     votes = d / (old.losses + float(np.mean(old.losses)))  # no block may outvote all others
     clear = float(votes.sum()) > CLEAR * float(np.sqrt(len(d)) * np.std(votes))
-    return clear and gain > MATTERS * old.loss and gain > LEAST * whole
+    if not clear or gain < MATTERS * old.loss:
+        return False
+    return gain > LEAST * whole or (_above_noise(old) > MATTERS * old.loss and _above_noise(new) < 0.5 * gain)
+
+
+def _above_noise(model: Regression) -> float:
+    """What is left of held-out rows beyond the sensors' noise. [N² m² or N²]"""
+    return max(model.loss - float(np.sum(model.rows.sigma[model.rows.whole] ** 2)), 0.0)
 
 
 def _revised(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], whole: float) -> Regression:
