@@ -38,6 +38,7 @@ class Axis:
     dry_slope: float = 0.0  # [1/rad] of F along the travel
     viscous_slope: float = 0.0  # [1/rad] of C
     unequal: float = 0.0  # share by which the drive gives more one way, and less the other
+    saturation: float = 0.0  # [1/A^2] loss of the torque constant by the current's square
     lines: tuple[tuple[float, float, float], ...] = ()  # amplitude [N m], order per motor turn, phase
     reads: float = 1.0  # recorded current over the true one
     warms: tuple[float, float, float] = (20.0, 20.0, 4.0)  # [°C] from, to, [s] with this time constant
@@ -47,7 +48,7 @@ class Axis:
 
 @njit(cache=False)
 def _run(reference, hz, p, of_load, along, warm, lines, loop, out):
-    J, F, C, k_t, bristle, dry_k, activation, dry_rate, viscous_rate, by_square, flux, unequal = p
+    J, F, C, k_t, bristle, dry_k, activation, dry_rate, viscous_rate, by_square, flux, unequal, saturation = p
     gravity, by_load, by_load_square = of_load
     dry_slope, viscous_slope = along
     K_p, K_w = loop
@@ -62,7 +63,7 @@ def _run(reference, hz, p, of_load, along, warm, lines, loop, out):
         drag = C * (1.0 + viscous_rate * t) * np.exp(activation * (1.0 / kelvin - 1.0 / 293.15))
         dry = F * (1.0 + dry_rate * t) * np.exp(-dry_k * (warm[k] - 20.0))
         for _ in range(FINE):
-            motor = k_t * (1.0 + flux * (warm[k] - 20.0) + unequal * np.sign(i)) * i
+            motor = k_t * (1.0 + flux * (warm[k] - 20.0) + unequal * np.sign(i)) * i / (1.0 + saturation * i * i)
             load = gravity * np.sin(theta)
             other = drag * (1.0 + viscous_slope * theta) * w + load
             for n in range(lines.shape[0]):
@@ -99,6 +100,7 @@ def record(
     p = (
         *(axis.J, axis.F, axis.C, axis.k_t, axis.bristle, axis.dry_per_kelvin, axis.viscous_activation),
         *(axis.dry_rate, axis.viscous_rate, axis.by_square, axis.flux_per_kelvin, axis.unequal),
+        axis.saturation,
     )
     of_load, along = (axis.gravity, axis.by_load, axis.by_load_square), (axis.dry_slope, axis.viscous_slope)
     _run(reference, axis.hz, p, of_load, along, warm, np.array(axis.lines, float).reshape(-1, 3), loop, out)

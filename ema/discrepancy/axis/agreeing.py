@@ -2,7 +2,8 @@
 
 Both judge held-out parts of the same records. Where free runs say little (slow motion, windows of a few samples,
 several laws at once) the balance is the sharper test; where a sensor or the electrical side is at fault, it sees
-nothing, and free runs decide. A law that the balance alone needs is named where free runs leave a rest.
+nothing, and free runs decide. A law that the balance alone needs is named where free runs leave a rest, if it is also
+missing beside what these found.
 """
 
 from __future__ import annotations
@@ -14,43 +15,61 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.discrepancy import findings as shared
+from ema.discrepancy.plant import Point
 from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
 from .balance.as_effects import effects
 from .balance.found import Balance, Term
 from .balance.telling import INTERVAL, drawn
+from .beside import balance_beside
 from .linear import in_metres
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
 
-LIKELY = 0.5  # confidence from which a law of the balance is named where free runs have not
+LIKELY = 0.5  # confidence in a law, or those it is not told from, from which it is named where free runs have not
 ALONE = " (shown by the balance along the measured motion, not by free runs)"
 
 
 def together(
-    plant: AxisPlant, found: Sequence[shared.FoundEffect], verdict: str
-) -> tuple[list[shared.FoundEffect], list[str]]:
-    """Effects as free runs found them, with what the balance says of them, and the names of those it adds."""
+    plant: AxisPlant, found: Sequence[shared.FoundEffect], verdict: str, point: Point
+) -> tuple[list[shared.FoundEffect], Balance | None]:
+    """Effects as free runs found them at `point`, with what the balance says of them, and a balance that adds some."""
     b = plant.balance
-    out, added = list(found), []
+    out = list(found)
     for term in b.terms if b is not None else ():
         assert b is not None
-        names = [name for name, values in effects(b, term).items() if values]
-        if not names:
-            continue
-        confidence = b.confidence(term)
-        own = [k for k, e in enumerate(out) if e.name == names[0] and _is_same(e, effects(b, term)[names[0]])]
+        name = _named(b, term)
+        own = [k for k, e in enumerate(out) if e.name == name and _is_same(e, effects(b, term)[name])]
         for k in own:
             if out[k].indistinguishable_from:
                 continue
-            out[k] = replace(out[k], confidence=max(out[k].confidence, round(confidence, 4)))
-        told = any(names[0] in (e.name, *e.indistinguishable_from) for e in out)
-        if not told and verdict not in ("adequate", "explained") and confidence >= LIKELY:
-            out.append(_effect(plant, b, term, names[0]))
-            added.append(names[0])
-    return out, added
+            out[k] = replace(out[k], confidence=max(out[k].confidence, round(b.confidence(term), 4)))
+    if b is None or verdict in ("adequate", "explained") or not _missing(b, out):
+        return out, None
+    if found:
+        b = balance_beside(plant, point)
+    added = _missing(b, out) if b is not None else []
+    if b is None or not added:
+        return out, None
+    return [*out, *(_effect(plant, b, term, _named(b, term)) for term in added)], b
+
+
+def _missing(b: Balance, found: Sequence[shared.FoundEffect]) -> list[Term]:
+    """Likely laws that the library has as effects, and that nothing found stands for."""
+    told = {name for e in found for name in (e.name, *e.indistinguishable_from)}
+    return [term for term in b.terms if _named(b, term) not in ("", *told) and _of_set(b, term) >= LIKELY]
+
+
+def _named(b: Balance, term: Term) -> str:
+    """The effect that acts like a law; empty where the library has none."""
+    return next((name for name, values in effects(b, term).items() if values), "")
+
+
+def _of_set(b: Balance, term: Term) -> float:
+    """Confidence in a law or one of those that do as well."""
+    return min(1.0, b.confidence(term) * (1.0 + sum(term.alike.values()) / max(term.wins, 1e-300)))
 
 
 def _is_same(e: shared.FoundEffect, values: dict[str, float]) -> bool:
@@ -73,8 +92,7 @@ def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.Found
         low, high = np.percentile(spread, INTERVAL)
         parameters[key] = shared.Quantity(value, float(low), float(high), units[key])
     others = tuple(sorted({*term.alike, *term.law.also}))
-    of_set = b.confidence(term) * (1.0 + sum(term.alike.values()) / max(term.wins, 1e-300))
-    confidence = round(min(of_set, 1.0) / (1 + len(others)), 4)  # those in a set share what is sure of it
+    confidence = round(_of_set(b, term) / (1 + len(others)), 4)  # those in a set share what is sure of it
     return shared.FoundEffect(
         name, confidence, others, parameters, said(effect.said(values)) + ALONE, effect.separated_by
     )  # fmt: skip

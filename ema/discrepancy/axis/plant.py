@@ -20,6 +20,7 @@ from . import candidates, describe, structure
 from .balance.found import Balance
 from .balance.of_records import balance
 from .intake import intake
+from .measured import Zero
 from .naming import Numbers, numbers_of
 from .noise import ESTIMATE_UNCERTAINTY
 from .noise_model import position_noise, whitener, without_start
@@ -65,7 +66,7 @@ class AxisPlant:
         if plant.window is None:
             lengths = [predictable(self, b) for b in self.benches]
             self._take([bench(plant, *parts) for parts in zip(records, names, lengths, strict=True)])
-        self.zeros = zeros(self)
+        self.zeros: dict[str, Zero] = zeros(self)
         self._balances: dict[str, Balance | None] = {}
 
     @property

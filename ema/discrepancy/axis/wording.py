@@ -13,6 +13,7 @@ from ema.models.axis_config import LinearAxis
 from . import stamps
 from .agreeing import together
 from .balance.as_effects import effects, point
+from .balance.found import Balance
 from .balance.telling import sentences, told
 from .closed_loop import closed_loop
 from .dropped import dropped
@@ -53,7 +54,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
     said = _balance(plant, outcome)
     verdict = shared.graded(outcome.verdict, gain)
-    found, added = together(plant, [_effect(e) for e in outcome.effects], verdict)
+    found, by_balance = together(plant, [_effect(e) for e in outcome.effects], verdict, outcome.point)
     found = with_external(plant, found)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
     if plant.plant.neighbour is not None:
@@ -68,7 +69,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         outcome.tried,
         notes,
         [asdict(r) for r in outcome.records],
-        _fitted(plant, outcome) if not added else _by_balance(plant),
+        _fitted(plant, outcome) if by_balance is None else _by_balance(plant, by_balance),
         rest=outcome.rest,
         rejected=dropped(plant, outcome, {name for e in found for name in (e.name, *e.indistinguishable_from)}),
         balance=said,
@@ -98,10 +99,9 @@ def _balance(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
     return out
 
 
-def _by_balance(plant: AxisPlant) -> dict[str, Any]:
+def _by_balance(plant: AxisPlant, b: Balance) -> dict[str, Any]:
     """Base parameters as the balance has them, where it adds effects that free runs had terms without a name for."""
-    assert plant.balance is not None
-    own = point(plant.balance, linear=isinstance(plant.plant, LinearAxis))
+    own = point(b, linear=isinstance(plant.plant, LinearAxis))
     kept = ["F_d", *(name for name in ("J", "M", "C") if name in plant.plant.fitted)]
     return {name: float(f"{own[name]:.6g}") for name in kept if name in own}
 
