@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ema.core.errors import ConfigError, NoCycleError, RecordError
+from ema.core.files import require_new
 from ema.core.folders import make_folder
 from ema.core.records import Record
 
@@ -72,8 +73,7 @@ def discrepancy(
     read = _chosen(read, cycles)
     files = [out / name for name in ("findings.json", "report.html", "extended.yaml")]
     for path in files:
-        if path.exists():
-            raise ConfigError(f"{path}: exists, and is not overwritten; choose another --out")
+        require_new(path)
     make_folder(out)
     complaints = [line for record in read for line in record.complaints]
     notes = [*_left_out(read, cycles), *empty, *complaints]

@@ -45,24 +45,19 @@ def init(
       ema plant init sine.csv rolling.csv --kv 300 --R 0.53 --pole-pairs 12 --out plant.yaml
       ema plant init positioner.csv --out plant.yaml
     """
-    from ema.core.errors import ConfigError
+    from ema.core.files import require_new, write_new
     from ema.core.records import each_once, read_record
     from ema.discrepancy.records import begin
 
     from .plant_file import actuator_file, axis_file
 
-    if out.exists():
-        raise ConfigError(f"{out}: exists, and is not overwritten; choose another --out")
+    require_new(out)
     found = [read_record(path) for path in each_once(files)]
     data = begin.Sheet(
         pole_pairs=pole_pairs, gear=gear, R=sheet["R"], L=sheet["L"], KV=sheet["kv"], k_t=sheet["k_t"], J=sheet["J"]
     )
     is_actuator = all({"i_a", "i_b", "i_c", "theta_m"} <= set(record.channels) for record in found)
     text = actuator_file(found, data, name) if is_actuator else axis_file(found, data, name)
-    try:
-        with out.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except OSError as error:
-        raise ConfigError(f"{out}: cannot be written ({error.strerror})") from error
+    write_new(out, text)
     click.echo(f"made {out}; what is marked 'a guess' wants your data sheet")
     click.echo(f"next: ema discrepancy --plant {out} {' '.join(map(str, files))} --out findings")

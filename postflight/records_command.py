@@ -12,6 +12,9 @@ import click
 if TYPE_CHECKING:
     from ema.core.records import Record
 
+PICTURES = (".svg", ".png", ".pdf")
+SEE_IT = "see it, or move it away"
+
 
 @click.group(short_help="Foreign records: what they hold, whether it agrees, what it allows.")
 def records() -> None:
@@ -40,14 +43,13 @@ def check(files: tuple[Path, ...], plant: Path | None, picture: Path | None, as_
       ema records check bench.csv --picture bench.svg --json
     """
     from ema.core.errors import ConfigError, NegativeAnswer
+    from ema.core.files import require_new
     from ema.core.records import each_once, read_record
     from ema.discrepancy.records import agreements, allowed, channels, sampling
 
     from .plans import plan_of
 
-    if picture is not None and picture.exists():
-        raise ConfigError(f"{picture}: exists, and is not overwritten; choose another --picture")
-    if picture is not None and picture.suffix.lower() not in (".svg", ".png", ".pdf"):
+    if picture is not None and require_new(picture, "choose another --picture").suffix.lower() not in PICTURES:
         raise ConfigError(f"{picture}: must end in .svg, .png or .pdf")
     plan = None if plant is None else plan_of(plant)
     found, answers = [], []
@@ -85,15 +87,16 @@ def map_columns(file: Path, write: bool) -> None:
       ema records map bench.csv --write
     """
     from ema.core import sidecar
-    from ema.core.errors import ConfigError, NegativeAnswer
+    from ema.core.errors import NegativeAnswer
+    from ema.core.files import require_new, write_new
     from ema.discrepancy.records.naming import propose
 
     from .proposed_sidecar import as_sidecar, table_of
 
     proposals = propose(table_of(file))
     beside = sidecar.beside(file)
-    if write and beside.exists():
-        raise ConfigError(f"{beside}: exists, and is not overwritten; see it, or move it away")
+    if write:
+        require_new(beside, SEE_IT)
     text = as_sidecar(file.name, proposals)
     if not any(one.channel == "t" for one in proposals):
         click.echo(text, nl=False)
@@ -103,11 +106,7 @@ def map_columns(file: Path, write: bool) -> None:
     if not write:
         click.echo(text, nl=False)
         return
-    try:
-        with beside.open("x", encoding="utf-8") as out:
-            out.write(text)
-    except OSError as error:
-        raise ConfigError(f"{beside}: cannot be written ({error.strerror})") from error
+    write_new(beside, text, SEE_IT)
     click.echo(f"made {beside}: read it, and mend what is not so")
     click.echo(f"next: ema records check {file}")
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,7 @@ MODES = {
 }
 BETWEEN = {"straight": kernel.STRAIGHT, "held": kernel.HELD, "held before": kernel.HELD_BEFORE, "fast": kernel.FAST}
 Effects = Mapping[str, Mapping[str, float]]
+State = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -146,8 +148,24 @@ def loads_after(
     follows : array of bool, shape (n,)
         Whether a motion begins where the one before it ended; otherwise the load begins untwisted and at rest.
     """
-    out = np.empty((len(follows), 2))
-    kernel.loads_after(numbers.z, offsets, t, theta, follows, h_max, out)
+
+    def along(of: slice, load: State) -> State:
+        return kernel.load_after(numbers.z, t[of], theta[of], h_max, *load)
+
+    return _after(offsets, follows, lambda first: (theta[first], 0.0), along)
+
+
+def _after(
+    offsets: NDArray[np.int64],
+    follows: NDArray[np.bool_],
+    begin: Callable[[int], State],
+    along: Callable[[slice, State], State],
+) -> Array:
+    """The state, shape (n, 2), at the end of each motion; one that follows begins where the last one ended."""
+    out, state = np.empty((len(follows), 2)), (0.0, 0.0)
+    for j, (first, end) in enumerate(itertools.pairwise(offsets.tolist())):
+        state = along(slice(first, end), state if follows[j] else begin(first))
+        out[j] = state
     return out
 
 
@@ -163,9 +181,11 @@ def bristles_after(
 
     `play`: half width of what is noise of the angle and no way. [rad]
     """
-    out = np.empty(len(follows))
-    kernel.bristles_after(numbers.z, offsets, t, theta, follows, play, out)
-    return out
+
+    def along(of: slice, bristle: State) -> State:
+        return kernel.bristle_after(numbers.z, theta[of], play, *bristle)
+
+    return _after(offsets, follows, lambda first: (0.0, theta[first]), along)[:, 0]
 
 
 def built_up(numbers: Model, share: float, way: float) -> float:

@@ -156,31 +156,17 @@ def load_after(z, t, theta, h_max, theta_l, w_l):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def loads_after(z, offsets, t, theta, follows, h_max, out):
-    """`load_after` for motions that lie one after the other; one that `follows` begins where the last one ended."""
-    theta_l, w_l = 0.0, 0.0
-    for j in range(offsets.shape[0] - 1):
-        a, b = offsets[j], offsets[j + 1]
-        if not follows[j]:
-            theta_l, w_l = theta[a], 0.0
-        theta_l, w_l = load_after(z, t[a:b], theta[a:b], h_max, theta_l, w_l)
-        out[j, 0], out[j, 1] = theta_l, w_l
+def bristle_after(z, theta, play, s, seen):
+    """Share of friction that is built up, given at `seen`, at the end of a recorded motion with noise within ±`play`.
 
-
-@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def bristles_after(z, offsets, t, theta, follows, play, out):
-    """Share of friction that is built up at the end of each recorded motion, which has noise within ±`play`."""
-    s, seen = 0.0, 0.0
-    for j in range(offsets.shape[0] - 1):
-        a, b = offsets[j], offsets[j + 1]
-        if not follows[j]:
-            s, seen = 0.0, theta[a]
-        for k in range(a, b):
-            moved = follow(seen, theta[k], play) - seen
-            if moved != 0.0:
-                s = friction_memory.built_up(s, moved, z[DEFLECTION])
-            seen += moved
-        out[j] = s
+    Also the angle that is `seen` there.
+    """
+    for k in range(theta.shape[0]):
+        moved = follow(seen, theta[k], play) - seen
+        if moved != 0.0:
+            s = friction_memory.built_up(s, moved, z[DEFLECTION])
+        seen += moved
+    return s, seen
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)

@@ -11,7 +11,8 @@ import pytest
 from ema import bundle
 from ema.bus.keys import load_keys
 from ema.core import config, csv_records
-from ema.core.errors import EmaError
+from ema.core.errors import ConfigError, EmaError
+from ema.core.files import require_new, write_new
 from ema.log import LogReader
 from ema.models.actuator import Actuator
 
@@ -65,3 +66,14 @@ def test_a_configuration_of_any_size_is_not_read(tmp_path):
         file.truncate(10**12)  # takes no room on the disk
     with pytest.raises(EmaError, match="has 1000000000000 bytes, at most 16000000 make sense"):
         config.load(path, Actuator)
+
+
+def test_what_exists_is_not_overwritten(tmp_path):
+    path = tmp_path / "plant.yaml"
+    write_new(path, "one\n")
+    for write in (require_new, lambda p: write_new(p, "two\n")):
+        with pytest.raises(ConfigError, match=f"{path}: exists, and is not overwritten; choose another --out"):
+            write(path)
+    assert path.read_text() == "one\n"
+    with pytest.raises(ConfigError, match="cannot be written"):
+        write_new(tmp_path / "no" / "plant.yaml", "three\n")
