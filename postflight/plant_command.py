@@ -32,6 +32,8 @@ def plant() -> None:
 @click.option("--L", "L", type=_POSITIVE, metavar="H", help="phase inductance [H]")
 @click.option("--kv", type=_POSITIVE, metavar="RPM/V", help="speed constant, line to line [rpm/V]")
 @click.option("--k-t", "k_t", type=_POSITIVE, metavar="N·m/A", help="torque per amplitude of current [N m/A]")
+@click.option("--supply", "V_dc", type=_POSITIVE, metavar="V", help="supply of which a duty cycle is a share [V]")
+@click.option("--brushed", is_flag=True, help="a DC motor with brushes: k_e = k_t, not that of one of three phases")
 @click.option("--J", "J", type=_POSITIVE, metavar="KG·M²", help="inertia or mass, where it is known [kg m^2, kg]")
 def init(
     files: tuple[Path, ...], out: Path, name: str, pole_pairs: int | None, gear: float | None, **sheet: Any
@@ -53,9 +55,7 @@ def init(
 
     require_new(out)
     found = [read_record(path) for path in each_once(files)]
-    data = begin.Sheet(
-        pole_pairs=pole_pairs, gear=gear, R=sheet["R"], L=sheet["L"], KV=sheet["kv"], k_t=sheet["k_t"], J=sheet["J"]
-    )
+    data = begin.Sheet(pole_pairs=pole_pairs, gear=gear, KV=sheet.pop("kv"), **sheet)
     is_actuator = all({"i_a", "i_b", "i_c", "theta_m"} <= set(record.channels) for record in found)
     text = actuator_file(found, data, name) if is_actuator else axis_file(found, data, name)
     write_new(out, text)

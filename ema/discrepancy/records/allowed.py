@@ -13,7 +13,7 @@ from .agreements import Agreement
 from .facts import FALLEN, ChannelFacts, Sampling
 
 ACTUATOR = ("t", *CURRENTS, "theta_m", "theta_u", "theta_cmd")
-DRIVES = ("i_q", "torque", "force", "u_q", "w_ref")
+DRIVES = ("i_q", "torque", "force", "u_q", "duty", "w_ref")
 FEW = 500  # samples of a record from which a fit has something left to be tested with
 JITTERY = 0.2  # of a period, rms
 

@@ -1,9 +1,6 @@
 """The first plant file of a record: what a data sheet says, what the record shows, what is only a guess; each marked.
 
-    τ = J dω/dt + C ω + F_d sgn ω + τ₀        τ = k_t i_q, or the measured torque
-    F = M dv/dt + C v + F_d sgn v + F₀
-
-fitted by least squares to derivatives over some samples: good enough to begin a search, and marked as that.
+What acts is k_t i_q, a measured torque or force, or k_t (u - k_e ω) / R by a voltage or a duty cycle of the supply.
 """
 
 from __future__ import annotations
@@ -15,11 +12,11 @@ import numpy as np
 
 from ema.core.errors import RecordError
 from ema.core.names import CHANNELS, CURRENTS
-from ema.core.records import Record
+from ema.core.records import Array, Cycle, Record
 
-from .agreements import OVER, agreements, derivative, smooth
+from .agreements import agreements, derivative, smooth
+from .first_fit import FirstFit, first_fit
 
-SLOW = 0.02  # of the highest speed; below, friction's sign is not known
 POLE_PAIRS = range(1, 31)
 COHERENT = 0.5  # share of the currents' vector that turns with the rotor, from which pole pairs can be told
 
@@ -35,7 +32,10 @@ class Known:
 
 @dataclass(frozen=True)
 class Sheet:
-    """What a data sheet says; None where it does not. Units: rpm/V, ohm (phase), H (phase), kg m², N m/A."""
+    """What a data sheet says; None where it does not. Units: rpm/V, ohm (phase), H (phase), kg m², N m/A, V.
+
+    A `brushed` motor has the back-EMF constant of its torque; of three phases it is that of one.
+    """
 
     pole_pairs: int | None = None
     gear: float | None = None
@@ -44,6 +44,8 @@ class Sheet:
     KV: float | None = None
     k_t: float | None = None
     J: float | None = None
+    V_dc: float | None = None
+    brushed: bool = False
 
 
 def axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
@@ -54,34 +56,45 @@ def axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
     position, speed = ("q", "v") if linear else ("theta_m", "w_m")
     if not have & {position, speed}:
         raise RecordError(f"{records[0].name}: no motion: theta_m, w_m, q or v is wanted (has {there})")
-    drive = next((name for name in ("force", "torque", "i_q", "u_q") if name in have), None)
+    drive = next((name for name in ("force", "torque", "i_q", "u_q", "duty") if name in have), None)
     if drive is None:
-        raise RecordError(f"{records[0].name}: no drive: i_q, torque, force or u_q is wanted (has {there})")
+        raise RecordError(f"{records[0].name}: no drive: i_q, torque, force, u_q or duty is wanted (has {there})")
     known = [Known("kind", "axis", "")] + ([Known("motion", "linear", "")] if linear else [])
-    known.append(Known("drive", {"i_q": "current", "u_q": "voltage"}.get(drive, drive), f"by the channel {drive}"))
+    kind = {"i_q": "current", "u_q": "voltage", "duty": "voltage"}.get(drive, drive)
+    known.append(Known("drive", kind, f"by the channel {drive}"))
     k_t, k_e, whence = _constants(sheet)
-    if drive in ("i_q", "u_q"):
+    if kind in ("current", "voltage"):
         known += [Known("k_t", _number(k_t, "N/A" if linear else "N m/A"), whence)]
-    if "u_q" in have:
-        known += [Known("k_e", _number(k_e, "V s/m" if linear else "V s/rad"), whence)]
-    for key, unit, value in (("R", "ohm", sheet.R), ("L", "H", sheet.L)):
+    if kind == "voltage" or "u_q" in have:
+        known += [Known("k_e", _number(k_e, "V s/m" if linear else "V s/rad"), f"{whence}{_of_phase(sheet)}")]
+    for key, unit, value in (("R", "ohm", sheet.R), ("L", "H", sheet.L), ("V_dc", "V", sheet.V_dc)):
         if value is not None:
             known.append(Known(key, _number(value, unit), "data sheet"))
-        elif key == "R" and drive == "u_q":
+        elif key == "R" and kind == "voltage":
             known.append(Known(key, "1 ohm", "a guess: give --R"))
+        elif key == "V_dc" and drive == "duty" and "u_dc" not in have:
+            known.append(Known(key, "24 V", "a guess: give --supply"))
+    fit = first_fit(records, position, speed, _torques(records, drive, position, speed, sheet, k_t, k_e))
+    return [*known, *_mechanical(fit, sheet, linear=linear)]
+
+
+def _mechanical(fit: FirstFit, sheet: Sheet, *, linear: bool) -> list[Known]:
+    """Inertia, drag and friction, each with where it is from."""
     mass, unit = ("M", "kg") if linear else ("J", "kg m^2")
-    scale = {"i_q": k_t}.get(drive, 1.0)
-    fit = None if drive == "u_q" else _balance(records, position, speed, drive, scale)
-    if fit is None:
-        inertia, C, F_d, origin = sheet.J or 1e-4, 0.0, 1e-3, "a guess: fitted where the search begins"
-    else:
-        (inertia, C, F_d), origin = fit, "fitted to the records, a start"
-    if sheet.J is not None:
-        known.append(Known(mass, _number(sheet.J, unit), "data sheet"))
-    else:
-        known.append(Known(mass, _number(max(inertia, 1e-9), unit), origin))
-    known.append(Known("C", _number(max(C, 0.0), "N s/m" if linear else "N m s/rad"), origin))
-    known.append(Known("F_d", _number(max(F_d, 0.0), "N" if linear else "N m"), origin))
+    beside = f", beside a torque of order {', '.join(f'{n:g}' for n in fit.orders)}" if fit.orders else ""
+    fitted, guess = f"fitted to the records, a start{beside}", "a guess: the records do not show it"
+    known = []
+    for key, its, value, otherwise, given in (
+        (mass, unit, fit.inertia, 1e-4, sheet.J),
+        ("C", "N s/m" if linear else "N m s/rad", fit.drag, 0.0, None),
+        ("F_d", "N" if linear else "N m", fit.friction, 1e-3, None),
+    ):
+        origin = "data sheet" if given is not None else fitted if value is not None else guess
+        known.append(Known(key, _number(next(x for x in (given, value, otherwise) if x is not None), its), origin))
+    if sheet.gear is not None:
+        known.append(
+            Known("gear", f"{sheet.gear:g}", "data sheet; measured_at: load where position and inertia are behind it")
+        )
     if sheet.pole_pairs and not linear:
         known.append(Known("p", str(sheet.pole_pairs), "data sheet"))
     fitted = f"[{mass}]" if sheet.J is None else "[]"
@@ -115,34 +128,36 @@ def back_emf(KV: float) -> float:
 def _constants(sheet: Sheet) -> tuple[float, float, str]:
     """k_t, k_e and where they are from: KV is of the line-to-line voltage, currents are amplitude-invariant."""
     if sheet.k_t is not None:
-        return sheet.k_t, sheet.k_t / 1.5, "data sheet"
+        return sheet.k_t, sheet.k_t if sheet.brushed else sheet.k_t / 1.5, "data sheet"
+    if sheet.KV is not None and sheet.brushed:
+        k_e = 60.0 / (2.0 * np.pi * sheet.KV)
+        return k_e, k_e, f"KV {sheet.KV:g} rpm/V: k_e = k_t = 60 / (2 pi KV)"
     if sheet.KV is not None:
         k_e = back_emf(sheet.KV)
         return 1.5 * k_e, k_e, f"KV {sheet.KV:g} rpm/V: k_e = 60 / (2 pi KV sqrt 3), k_t = 3/2 k_e"
     return 1.0, 1.0, "a guess: give --kv or --k-t; until then inertia and friction are in units of the current"
 
 
-def _balance(
-    records: Sequence[Record], position: str, speed: str, drive: str, scale: float
-) -> tuple[float, float, float] | None:
-    """Inertia, viscous and sliding friction by least squares; None where nothing moves."""
-    rows, rhs = [], []
-    for cycle in (cycle for record in records for cycle in record.cycles if cycle.n_samples > 8 * OVER):
+def _of_phase(sheet: Sheet) -> str:
+    return "; that of k_t" if sheet.brushed else "; k_t / 1.5 as of three phases: give --brushed if it is none"
+
+
+def _torques(
+    records: Sequence[Record], drive: str, position: str, speed: str, sheet: Sheet, k_t: float, k_e: float
+) -> list[list[Array]]:
+    """The drive's torque at the samples, by record and cycle; zeros where a voltage does not tell it."""
+
+    def of(cycle: Cycle) -> Array:
+        if drive not in ("u_q", "duty"):
+            return cycle[drive] * (k_t if drive == "i_q" else 1.0)
+        supply = 1.0 if drive == "u_q" else cycle.channels.get("u_dc", sheet.V_dc)
+        if sheet.R is None or supply is None:
+            return np.zeros(cycle.n_samples)
+        u = cycle[drive] * supply
         w = smooth(cycle[speed]) if speed in cycle else derivative(cycle, position)
-        a, tau = derivative(cycle, w), scale * smooth(cycle[drive])
-        inside = slice(2 * OVER, -2 * OVER)
-        rows.append(np.stack([a, w, np.sign(w), np.ones_like(w)], axis=1)[inside])
-        rhs.append(tau[inside])
-    if not rows:
-        return None
-    A, b = np.concatenate(rows), np.concatenate(rhs)
-    moving = np.abs(A[:, 1]) > SLOW * np.abs(A[:, 1]).max()
-    if moving.sum() < 50:
-        return None
-    size = np.maximum(np.linalg.norm(A[moving], axis=0), 1e-300)
-    x, *_ = np.linalg.lstsq(A[moving] / size, b[moving], rcond=1e-9)
-    inertia, C, F_d, _ = (float(value) for value in x / size)
-    return inertia, C, F_d
+        return np.asarray(k_t * (u - k_e * w) / sheet.R)
+
+    return [[of(cycle) for cycle in record.cycles] for record in records]
 
 
 def _number(value: float, unit: str) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
-from plain_axis import F_D, K_T, C, J, bench
+from plain_axis import F_D, K_T, RATE, C, J, bench
 
 from ema.cli import cli
 from ema.core import config
@@ -57,3 +58,51 @@ def test_nothing_is_overwritten_and_no_motion_is_told(tmp_path):
     none = CliRunner().invoke(cli, ["plant", "init", str(tmp_path / "x.csv"), "--out", str(tmp_path / "y.yaml")])
     assert "no motion" in str(none.exception)
     assert not (tmp_path / "y.yaml").exists()
+
+
+def cogging_bench(order=12.0, size=0.02, seed=1):
+    """A slow motion in which cogging takes twice as much as friction, and the axis swings over it."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, 12.0, 1.0 / RATE)
+    w = np.where(t < 6.0, 2.0, -2.0) * (1.0 + 0.6 * np.sin(order * 2.0 * t)) + 0.2 * np.sin(2.9 * t)
+    theta = np.cumsum(w) / RATE
+    tau = J * np.gradient(w, t) + C * w + F_D * np.sign(w) + size * np.sin(order * theta + 0.5)
+    channels = {"t": t, "theta_m": theta + 2e-5 * rng.standard_normal(len(t)), "i_q": tau / K_T}
+    channels["i_q"] = channels["i_q"] + 0.01 * rng.standard_normal(len(t))
+    return Record((Cycle(0, channels),))
+
+
+def test_cogging_is_not_taken_for_dry_friction(tmp_path):
+    path = init(cogging_bench(), tmp_path, "--k-t", str(K_T))
+    plant = axis_config.load(path)
+    assert pytest.approx(F_D, rel=0.15) == plant.F_d
+    assert pytest.approx(J, rel=0.15) == plant.J
+    assert "order 12" in path.read_text()
+
+
+def test_one_speed_shows_neither_inertia_nor_drag(tmp_path):
+    t = np.arange(0.0, 20.0, 0.01)
+    w = np.where(t < 10.0, 0.3, -0.3)
+    theta = np.cumsum(w) * 0.01
+    tau = F_D * np.sign(w) + 2e-4 * np.random.default_rng(1).standard_normal(len(t))
+    path = init(Record((Cycle(0, {"t": t, "theta_m": theta, "torque": tau}),)), tmp_path)
+    plant = axis_config.load(path)
+    assert pytest.approx(F_D, rel=0.05) == plant.F_d
+    assert plant.C == 0.0
+    lines = path.read_text().splitlines()
+    assert all("a guess" in line for line in lines if line.startswith(("J:", "C:")))
+
+
+@pytest.mark.parametrize("channel", ["u_q", "duty"])
+def test_a_voltage_or_a_duty_cycle_drives(channel, tmp_path):
+    R, supply = 0.8, 24.0
+    cycle = bench().cycles[0]
+    u = R * cycle["i_q"] + K_T * cycle["w_m"]
+    whole, said = (supply, ("--supply", str(supply))) if channel == "duty" else (1.0, ())
+    channels = {name: cycle[name] for name in ("t", "theta_m", "w_m")} | {channel: u / whole}
+    options = ("--k-t", str(K_T), "--R", str(R), "--brushed", *said)
+    plant = axis_config.load(init(Record((Cycle(0, channels),)), tmp_path, *options))
+    assert plant.drive == "voltage"
+    assert plant.k_e == plant.k_t == K_T
+    assert pytest.approx(J, rel=0.05) == plant.J
+    assert pytest.approx(F_D, rel=0.3) == plant.F_d
