@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from .fitting import Fit, fit, jacobian
-from .held_out import by_record, over_folds, training_gain
+from .grade import LIMIT, Left, graded
+from .held_out import by_record, over_folds, residual_over_folds, training_gain
 from .outcome import Gain, Outcome
 from .plant import Candidate, Free, Plant, Point
 from .progress import Progress
@@ -35,7 +36,6 @@ MAX_ADDED = 5  # of both kinds, further lines of a kind that is there already co
 IMMATERIAL = 0.01  # of the noise's mean square: what takes less is told, and no cause: no plant file is that exact
 MANY = 12  # free parameters from which an effect is revised beside its strongest rivals only
 N_RIVALS = 6
-EXPLAINED = 1.2  # held-out residual over noise up to which a model counts as explaining the data
 UNLIKELY = 0.1  # odds of an effect with all that the data cannot tell from it, below which it is not named
 MIMICKED = 0.02  # of an effect's mark in power, where less is left of it beside the base parameters it cannot be seen
 
@@ -68,24 +68,22 @@ def examine(plant: Plant, progress: Progress | None = None) -> Outcome:
     trust = _without_unlikely(plant, state, progress)
     plain = state.plain
     verdict = _judged(plant, plain)
+    left = _without_small_terms(plant, state)
     progress("final fit")
     chosen = list(state.model.accepted)  # where folds suggested different parameters, those of the first fold
     free = [*plant.base, *(f for c in chosen for f in c.free)]
     final = fit(plant, free, state.model.fits[0].point, everything)
     before = fit(plant, plant.base, plain.fits[0].point, everything)
-    explained = _is_explained(plant, plain, state.model)
     terms = [c for c in chosen if c.is_structure]
-    outcome: Any = "explained" if explained and not terms else "unexplained"
-    if verdict.is_noise or (explained and not chosen):
-        outcome = "adequate"
-    if outcome == "adequate" and not verdict.is_noise:
+    outcome = graded(left, named=len(terms) < len(chosen))
+    if outcome == "adequate" and not left.is_chance:
         notes.append(
-            f"what is left is {verdict.rms:.3g} times the noise and not white ({verdict.because}, "
-            f"p = {verdict.p_value:.1g}), and no effect and no term foretells held-out parts better by what matters: "
-            "filtered, quantised or held channels can look like this, and so can something small that is missing"
+            f"{left.sentence} ({verdict.because}, p = {verdict.p_value:.1g}), and no effect and no term foretells "
+            "held-out parts better by what matters: filtered, quantised or held channels can look like this, and so "
+            "can something small that is missing"
         )
-        if state.immaterial:
-            notes.append(f"{state.immaterial}: too little for a cause")
+    if state.immaterial and outcome in ("adequate", "explained"):
+        notes.append(f"{state.immaterial}: too little for a cause")
     last = _judged(plant, state.model)
     folds = over_folds(plant, plain, state.model)
     names = [f.name for f in plant.base]
@@ -94,10 +92,12 @@ def examine(plant: Plant, progress: Progress | None = None) -> Outcome:
         because=verdict.because,
         p_value=verdict.p_value,
         effects=_effects(plant, state, trust, final.point, final.draw),
-        structure=plant.describe_structure(terms, final.point) if outcome == "unexplained" else {},
+        structure=plant.describe_structure(terms, final.point) if terms or outcome == "unexplained" else {},
         train=training_gain(plant, plain, state.model),
         heldout=Gain(folds.err_before, folds.err_after, folds.noise_floor),
         folds=folds,
+        left=left,
+        lost=_lost(state),
         base=names,
         k_before=[float(before.point[n]) for n in names],
         k_after=[float(final.point[n]) for n in names],
@@ -109,6 +109,47 @@ def examine(plant: Plant, progress: Progress | None = None) -> Outcome:
         notes=notes,
         rest=0.0 if last.is_noise else state.model.rms,
     )
+
+
+def _lost(state: _State) -> list[dict[str, Any]]:
+    """Effects of the library that were tried in the place of one that is named, gain by more than chance, and lost."""
+    rows: dict[str, dict[str, Any]] = {}
+    for own, (trials, before) in zip(state.model.accepted, state.rounds, strict=True):
+        scale = min(t.scale for t in trials.values())
+        told = {own.key, *alike(trials, own.key, before), *(c.key for c in state.model.accepted)}
+        for key, trial in trials.items():
+            if key in told or is_nameless(key, trial) or not compare(trial, before, scale).is_significant:
+                continue
+            lead = compare(trials[own.key], trial, scale)
+            why = (
+                f"{lead.gain:.1f} ± {lead.error:.1f} nats behind {own.key} by what held-out parts say; in its place "
+                f"leaves {trial.rms:.3g} of them where noise is 1; {own.key}: {trials[own.key].rms:.3g}"
+            )
+            row = {"name": key, "before": before.rms, "after": trial.rms, "nats": lead.gain, "nats_error": lead.error,
+                   "nats_of": "held-out parts", "why": why}  # fmt: skip
+            if key not in rows or lead.gain < rows[key]["nats"]:
+                rows[key] = row
+    return sorted(rows.values(), key=lambda row: row["nats"])
+
+
+def _without_small_terms(plant: Plant, state: _State) -> Left:
+    """What named causes alone leave; where that is no more than noise may, terms without a name are left out."""
+    terms = {k for k, c in enumerate(state.model.accepted) if c.is_structure}
+    named = _leave_out(plant, state.model, terms) if terms else state.model
+    left = Left(
+        _judged(plant, named).is_noise,
+        over_folds(plant, state.plain, named),
+        residual_over_folds(plant, state.plain, named),
+        above_noise(named) < FORM**2 * above_noise(state.plain),
+        plant.noise_uncertainty,
+    )
+    if terms and graded(left, named=bool(named.accepted)) in ("adequate", "explained"):
+        keys = " and ".join(state.model.accepted[k].key for k in sorted(terms))
+        mark = above_noise(named) - above_noise(state.model)
+        state.immaterial = f"{keys} would take {mark:.1%} of the noise's mean square from it"
+        state.rounds = [of for k, of in enumerate(state.rounds) if k not in terms]
+        state.model = named
+    return left
 
 
 def _mimicked(plant: Plant, model: Fit) -> tuple[str, ...]:
@@ -127,7 +168,7 @@ def _mimicked(plant: Plant, model: Fit) -> tuple[str, ...]:
 
 def _is_explained(plant: Plant, plain: Tried, model: Tried) -> bool:
     """Noise is left, or little more, or what the wrong form of the laws found may leave."""
-    if model.rms <= EXPLAINED:
+    if model.rms <= LIMIT:
         return True
     if above_noise(model) < FORM**2 * above_noise(plain):
         return True

@@ -10,10 +10,10 @@ from typing import Any, Literal
 import numpy as np
 
 from ema.core.version import version
+from ema.effects import registry
 
 from .folds import Folds
-
-Verdict = Literal["adequate", "explained", "partly explained", "unexplained", "unfinished"]
+from .grade import Verdict
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,11 @@ class Quantity:
     low: float
     high: float
     unit: str
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation, by the side of the interval that no bound cuts off."""
+        return max(self.high - self.value, self.value - self.low) / WITHIN
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,17 @@ class FoundEffect:
     of_others: float | None = None
 
     @property
+    def z(self) -> float | None:
+        """Deviations by which its size differs from nothing, the largest of its sizes (a gain of each phase, say).
+
+        Sizes are parameters of the kind of the first; None where no interval was told.
+        """
+        declared = registry()[self.name].parameters if self.name in registry() else ()
+        sizes = {p.name: p.neutral for p in declared if (p.unit, p.neutral) == (declared[0].unit, declared[0].neutral)}
+        told = [(q, sizes[name]) for name, q in self.parameters.items() if name in sizes and q.sd > 0.0]
+        return max((abs(q.value - neutral) / q.sd for q, neutral in told), default=None)
+
+    @property
     def of_set(self) -> float:
         """Confidence that it is this one or one of those that it cannot be told from, which share what is sure."""
         if self.of_others is not None:
@@ -66,24 +82,19 @@ class Gain:
     k_after: tuple[float, ...] = ()
     false_alarms_before: int = 0
     false_alarms_after: int = 0
+    k_interval: tuple[tuple[float, float], ...] = ()  # of 95 %, of k_after
     k_names: tuple[str, ...] = ()  # where they are not the faults k1…k6
     what: str = "error of the simulated envelope"
     scale: float = 1e3
     unit: str = "mA"
     folds: Folds | None = None  # what the held-out errors are made of, where every part was held out once
+    residual: Folds | None = None  # the same of the residual weighed by its noise, in its deviations
 
     @property
     def rest(self) -> float:
-        """Error on held-out parts over what noise makes of it."""
-        return self.heldout_after / max(self.noise_floor, 1e-300)
-
-
-def graded(verdict: Literal["adequate", "explained", "unexplained"], gain: Gain) -> Verdict:
-    """The verdict, where causes that are named leave more than noise of what they were not fitted to.
-
-    That is measured over folds, so that no lucky split decides.
-    """
-    return "partly explained" if verdict == "explained" and gain.rest > EXPLAINED else verdict
+        """What is left of held-out parts over what noise makes of it, of error or residual whichever is more."""
+        error = self.heldout_after / max(self.noise_floor, 1e-300)
+        return max(error, self.residual.rest) if self.residual else error
 
 
 @dataclass(frozen=True)
@@ -104,7 +115,9 @@ class Findings:
         What is left over noise, where that is told and it is more than noise; else 0.
     rejected : list of dict
         What was considered and is not the answer: its ``name``, what faults alone (``before``) and what it (``after``)
-        leaves of held-out parts over noise, and ``why``.
+        leaves of held-out parts over noise, by how many ``nats`` it is less likely than the answer (None where that
+        is not known) with the ``nats_error``, what was weighed (``nats_of``: the evidence of the record, or held-out
+        parts), and ``why`` in words.
     posterior : list of dict
         Sets of causes with their probability, likeliest first: ``effects``, ``faults`` above 1 %, ``probability``,
         ``nats_behind`` the likeliest and ``nats_error``, what other seeds would make of that. Of the sets that were
@@ -146,7 +159,7 @@ class Findings:
         return {
             "verdict": self.verdict,
             **({"unfinished": True, "leading": self.leading} if self.verdict == "unfinished" else {}),
-            "effects": [asdict(effect) for effect in self.effects],
+            "effects": [{**asdict(effect), "z": effect.z} for effect in self.effects],
             "structure": self.structure,
             "gain": {
                 "train": {"err_before": known(g.train_before), "err_after": known(g.train_after)},
@@ -158,9 +171,11 @@ class Findings:
                 **({"k_names": list(g.k_names)} if g.k_names else {}),
                 "k_before": list(g.k_before),
                 "k_after": list(g.k_after),
+                **({"k_interval": [list(of) for of in g.k_interval]} if g.k_interval else {}),
                 "false_alarms_before": g.false_alarms_before,
                 "false_alarms_after": g.false_alarms_after,
                 **({"folds": g.folds.as_dict()} if g.folds else {}),
+                **({"residual": g.residual.as_dict()} if g.residual else {}),
             },
             **({"posterior": self.posterior} if self.posterior else {}),
             **({"next_recording": self.next_recording} if self.next_recording else {}),
@@ -185,10 +200,8 @@ class Findings:
         if self.verdict == "adequate":
             if not self.rest:
                 return ["The simulation agrees with the measurement: what is left is noise."]
-            return [
-                f"What is left is small, {self.rest:.3g} times the noise, but it is not noise; nothing that was tried "
-                "foretells it."
-            ]
+            left = f"What is left is small, {self.rest:.3g} times the noise, but it is not noise"
+            return [left + ("; its structure: " + describe(self.structure) if self.structure else "") + "."]
         said = [_said(effect) for effect in self.effects]
         if self.verdict == "explained" and self.rest > SEEN:
             said.append(
@@ -209,7 +222,7 @@ class Findings:
 
 
 SURE = 0.9
-EXPLAINED = 1.2  # times what noise makes of the error of held-out parts, beyond which a record is not explained
+WITHIN = 1.96  # deviations from the value to either end of an interval of 95 %
 SEEN = 1.05  # times the noise, where a rest beside a cause is worth a word
 
 

@@ -68,6 +68,11 @@ class Folds:
         return self._jackknife(lambda w: _rms(after, w) / max(_rms(floor, w), 1e-300))
 
     @property
+    def told_rest(self) -> str:
+        """`rest` with its error, in words."""
+        return f"{self.rest:.3g} ± {self.rest_error:.2g}" if len(self.names) > 1 else f"{self.rest:.3g}"
+
+    @property
     def _weights(self) -> Array:
         return np.array(self.weight, dtype=float)
 
@@ -89,7 +94,7 @@ class Folds:
         gain, error = (f"{scale * x:.3g}" for x in (self.gain, self.gain_error))
         return (
             f"Held out one by one, {len(self.names)} parts are foretold better by {gain} ± {error} {unit}; "
-            f"what is left is {self.rest:.3g} ± {self.rest_error:.2g} times what noise makes of it."
+            f"what is left is {self.told_rest} times what noise makes of it."
         )
 
     def as_dict(self) -> dict[str, Any]:

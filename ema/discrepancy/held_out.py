@@ -35,6 +35,19 @@ def over_folds(plant: Plant, plain: Tried, model: Tried) -> Folds:
     return Folds(names, before, after, floor, shares)
 
 
+def residual_over_folds(plant: Plant, plain: Tried, model: Tried) -> Folds:
+    """Mean squares of the whitened residual of every part, each by the fits that had not seen it; noise makes one."""
+    parts = _parts(plant)
+    before, after = ([_mean_square(t, blocks) for _, _, blocks in parts] for t in (plain, model))
+    n = tuple(float(sum(model.held_out[j].size for j in blocks)) for _, _, blocks in parts)
+    return Folds(tuple(name for name, _, _ in parts), tuple(before), tuple(after), (1.0,) * len(parts), n)
+
+
+def _mean_square(model: Tried, blocks: set[int]) -> float:
+    """Of some blocks, single wild samples clipped as in `Tried.rms`."""
+    return replace(model, held_out=tuple(model.held_out[j] for j in sorted(blocks))).rms ** 2
+
+
 def by_record(plant: Plant, plain: Tried, model: Tried) -> list[RecordGain]:
     """Errors before and after of the held-out parts of each record."""
     out = []

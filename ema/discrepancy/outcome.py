@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 from .folds import Folds
+from .grade import Left, Verdict
 from .plant import Point
 
 
@@ -37,9 +38,7 @@ class Outcome:
     Attributes
     ----------
     verdict : str
-        ``adequate``: the residual is noise, or (`rest`) within a fifth of it and nothing foretells it better.
-        ``explained``: with the effects it is noise, or (`rest`) little of it is left.
-        ``unexplained``: something is left; `structure` says what it looks like.
+        See `grade`.
     because : str
         What the verdict on the plain model rests on.
     effects : list of dict
@@ -52,11 +51,13 @@ class Outcome:
         Standard deviations of `k_after`.
     rest : float
         Residual over noise where the final model leaves more than noise, 0 where it does not.
+    lost : list of dict
+        Effects that foretell held-out parts, but worse than the one that is in their place: as in `Findings.rejected`.
     point : Point
         All fitted values of the final model.
     """
 
-    verdict: Literal["adequate", "explained", "unexplained"]
+    verdict: Verdict
     because: str
     p_value: float
     effects: list[dict[str, Any]]
@@ -74,3 +75,5 @@ class Outcome:
     notes: list[str] = field(default_factory=list)
     rest: float = 0.0
     folds: Folds | None = None
+    left: Left | None = None
+    lost: list[dict[str, Any]] = field(default_factory=list)

@@ -10,7 +10,7 @@ from ema_postflight.discrepancy import discrepancy
 from ema.core import resources
 from ema.core.errors import ConfigError
 from ema.core.version import version
-from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity, graded
+from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
 from ema.discrepancy.report import write_report
 from ema.effects import registry
 
@@ -58,19 +58,6 @@ def test_what_was_found_before_is_not_overwritten(tmp_path):
     assert (found / "extended.yaml").read_bytes() == plant.read_bytes()
 
 
-@pytest.mark.parametrize(
-    ("verdict", "left", "says"),
-    [
-        ("explained", 1.1, "explained"),
-        ("explained", 1.3, "partly explained"),
-        ("unexplained", 1.3, "unexplained"),
-        ("adequate", 1.3, "adequate"),  # a rest without a cause is told by `rest`
-    ],
-)
-def test_what_leaves_more_than_noise_of_other_cycles_is_explained_in_part_only(verdict, left, says):
-    assert graded(verdict, Gain(1.0, 0.1, 1.0, 0.1 * left, 0.1)) == says
-
-
 def test_what_is_explained_in_part_says_what_is_left():
     effect = FoundEffect("spring_load", 0.99, (), {}, "a spring", "slow motion")
     gain = Gain(1.0, 0.1, 1.0, 0.23, 0.1)
@@ -88,6 +75,23 @@ def test_findings_say_where_a_cause_acts_what_lost_and_what_made_them():
     assert said["effects"][0]["place"] == "recorder"
     assert said["rejected"] == [lost]
     assert (said["version"], said["seeds"]) == (version(), {"fit": 7})
+
+
+def test_a_size_is_so_many_deviations_from_nothing_and_a_place_or_a_shape_is_not():
+    """By the side of the interval that no bound cuts off; of several sizes the surest."""
+    line = {"amplitude": Quantity(0.01, 0.008, 0.012, "N m"), "order": Quantity(12.0, 11.9, 12.1, "")}
+    gains = {f"gain_{p}": Quantity(x, x - 0.01, x + 0.01, "") for p, x in zip("abc", (0.0, -0.05, 0.01), strict=True)}
+    of = {name: FoundEffect(name, 0.9, (), q, "", "") for name, q in (("cogging", line), ("current_gain", gains))}
+    assert of["cogging"].z == pytest.approx(1.96 * 5.0)
+    assert of["current_gain"].z == pytest.approx(1.96 * 5.0)
+    cut = FoundEffect("cogging", 0.9, (), {"amplitude": Quantity(0.001, 0.0, 0.003, "N m")}, "", "")
+    assert cut.z == pytest.approx(1.96 / 2.0)
+    assert FoundEffect("cogging", 0.9, (), {"amplitude": Quantity(0.01, 0.01, 0.01, "N m")}, "", "").z is None
+    said = Findings(
+        "explained", [of["cogging"]], Gain(1, 1, 1, 1, 1, k_after=(0.1,), k_interval=((0.0, 0.2),))
+    ).as_dict()
+    assert said["effects"][0]["z"] == of["cogging"].z
+    assert said["gain"]["k_interval"] == [[0.0, 0.2]]
 
 
 def test_sensors_of_the_loop_and_of_the_recorder_are_different_effects():

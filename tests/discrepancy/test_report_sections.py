@@ -17,7 +17,9 @@ SCREENS = ((1280, 900, False), (1280, 900, True), (390, 844, True))
 def full():
     """An answer with everything that a report can show of it."""
     folds = Folds(("cycle 0", "cycle 1"), (2.2e-3, 1.8e-3), (1.1e-4, 0.9e-4), (1e-4, 1e-4), (1.0, 1.0))
-    gain = Gain(0.04, 0.01, folds.err_before, folds.err_after, folds.noise_floor, (0.0,) * 6, (0.0,) * 6, folds=folds)
+    errors = 0.04, 0.01, folds.err_before, folds.err_after, folds.noise_floor
+    intervals = ((0.008, 0.0123),) * 6
+    gain = Gain(*errors, (0.0,) * 6, (0.01,) * 6, k_interval=intervals, folds=folds, residual=folds)
     stiffness = Quantity(100.0, 95.0, 105.0, "N m/rad")
     spring = FoundEffect("spring_load", 0.49, ("constant_load",), {"stiffness": stiffness}, "a spring", "another place")
     sets = [(["spring_load"], 0.72, 0.0), (["constant_load"], 0.27, 1.0), ([], 0.0, 900.0)]
@@ -27,7 +29,11 @@ def full():
     motion = {"motion": "a slow triangle", "deviations": 12.3, "deviations_by_chance": 3.6, "shows_in": "torque"}
     nxt = {"between": [["spring_load"], ["constant_load"]], "cycles": 4, "motions": [motion],
            "sentence": "To tell spring_load from constant_load, record 4 cycles of a slow triangle"}  # fmt: skip
-    return Findings("explained", [spring], gain, posterior=posterior, next_recording=nxt)
+    lost = [{"name": "inertia", "before": 9.0, "after": 5.0, "nats": 41.2, "nats_error": 0.5, "nats_of": "evidence",
+             "why": "41.2 ± 0.5 nats behind spring_load by the evidence of the record; leaves 5"},
+            {"name": "cogging", "before": 9.0, "after": 6.0, "nats": None, "nats_error": None, "nats_of": None,
+             "why": "leaves 6"}]  # fmt: skip
+    return Findings("explained", [spring], gain, posterior=posterior, next_recording=nxt, rejected=lost)
 
 
 def test_sets_and_what_would_tell_them_apart_are_shown(full, tmp_path):
@@ -42,6 +48,12 @@ def test_sets_and_what_would_tell_them_apart_are_shown(full, tmp_path):
         "What to record next",
         "a slow triangle",
         "12.3",
+        "0.008 … 0.0123",
+        "weighed by its noise, which sees more, 1 ±",
+        "39.2",  # deviations of the spring from none
+        "behind the answer [nats]",
+        "41.2 ± 0.5 nats behind spring_load",
+        "not known",
     ):
         assert words in text
     assert "Held out one by one, 2 parts are foretold better by" in text

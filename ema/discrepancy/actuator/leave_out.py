@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,26 +53,35 @@ class _Linear:
         return there if gone < sum(self.cost[c] for c in cycles) else point
 
 
-def over_folds(search: Search, before: Model, after: Model) -> Folds:
-    """What `before` and `after` leave of the envelope of each cycle when the other cycles alone give their parameters.
+def over_folds(search: Search, before: Model, after: Model) -> tuple[Folds, Folds]:
+    """What `before` and `after` leave of each cycle when the other cycles alone give their parameters.
 
-    Parameters are refitted to first order about the answer, which costs two simulations of each cycle and fold instead
-    of a fit. Which effects these are was decided with all cycles.
+    Of the envelope [A²], and of the whitened features [per feature], which see more. Parameters are refitted to first
+    order about the answer, which costs two simulations of each cycle and fold instead of a fit. Which effects these are
+    was decided with all cycles.
     """
-    plant, data = search.plant, search.plant.data
+    plant, data, noise = search.plant, search.plant.data, search.noise
     cycles = sorted(range(data.n_cycles), key=lambda c: (int(data.motion[c]), c))
     models = [before] if after is before else [before, after]
     linear = [_Linear.of(search, m, cycles) for m in models]
     squares: list[dict[int, float]] = [{} for _ in models]
+    residual: list[dict[int, float]] = [{} for _ in models]
     for fold in dealt(cycles, N_FOLDS):
         rest = [c for c in cycles if c not in fold]
         points = [m.fitted_to(search, rest) for m in linear]
         runs = plant.repeated(points, fold, N_FINAL, FINAL_SEED)
-        for of, at in zip(squares, runs, strict=True):
+        for of, whitened, at in zip(squares, residual, runs, strict=True):
             of |= {c: square(plant, c, at[c].envelopes.mean(axis=0)) for c in fold}
-    floor = [_floor(search, c) for c in sorted(cycles)]
-    left = [tuple(of[c] for c in sorted(cycles)) for of in squares]
-    return Folds(data.labels, left[0], left[-1], tuple(floor), (1.0,) * len(cycles))
+            left = {c: noise.of(c).white(data.y[c] - at[c].features.mean(axis=0)) for c in fold}
+            whitened |= {c: float(np.mean(x**2)) for c, x in left.items()}
+    order = sorted(cycles)
+
+    def folds(of: Sequence[dict[int, float]], floor: Callable[[Search, int], float], weight: Sequence[float]) -> Folds:
+        b, a = (tuple(each[c] for c in order) for each in (of[0], of[-1]))
+        return Folds(data.labels, b, a, tuple(floor(search, c) for c in order), tuple(weight))
+
+    n_features = [float(len(data.y[c])) for c in order]
+    return folds(squares, _floor, [1.0] * len(order)), folds(residual, _whitened_floor, n_features)
 
 
 def square(plant: EmaPlant, cycle: int, simulated: Array) -> float:
@@ -84,3 +94,8 @@ def _floor(search: Search, cycle: int) -> float:
     """What noise makes of a cycle and of the mean of the runs it is compared with. [A²]"""
     sd = search.noise.of(cycle).envelope_sd[settled(search.plant) :]
     return float(np.mean(sd**2)) * (1.0 + 1.0 / N_FINAL)
+
+
+def _whitened_floor(search: Search, cycle: int) -> float:
+    """What noise makes of a whitened feature of a cycle, by runs that the whitening has not seen."""
+    return float(np.mean(search.noise.of(cycle).fresh ** 2)) * (1.0 + 1.0 / N_FINAL)

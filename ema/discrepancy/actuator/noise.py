@@ -120,9 +120,11 @@ class Noise:
 
     def misfit(self, residuals: Sequence[Array], cycles: Sequence[int]) -> float:
         """Sum of squared whitened residuals over what noise makes of it; about one if the model is right."""
-        total = sum(float(r @ r) for r in residuals)
-        expected = sum(float((self.of(c).fresh ** 2).sum(axis=1).mean()) for c in cycles)
-        return total / expected
+        return sum(float(r @ r) for r in residuals) / self.expected(cycles)
+
+    def expected(self, cycles: Sequence[int]) -> float:
+        """What noise makes of the sum of squared whitened residuals."""
+        return sum(float((self.of(c).fresh ** 2).sum(axis=1).mean()) for c in cycles)
 
 
 def scatter(noise: Noise, solution: Sequence[Array], cycles: Sequence[int]) -> Array:

@@ -35,6 +35,7 @@ class Model:
     effects: tuple[Candidate, ...]
     fit: Fit
     heldout: float
+    by: Noise | None = None  # the noise that `heldout` is measured by
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -85,7 +86,7 @@ class Search:
         return self._judged(model.effects, fitted)
 
     def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:
-        made = Model(tuple(effects), fitted, self._misfit(self.noise, fitted.point, self.heldout))
+        made = Model(tuple(effects), fitted, self._misfit(self.noise, fitted.point, self.heldout), self.noise)
         self.tried.append(made)
         self.say.fitted(made.names, made.heldout, made.fit.point, by=self.noise)
         return made

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from ema.core.names import FAULTS
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.engine.posterior import p_cause
-from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity, graded
+from ema.discrepancy.findings import WITHIN, Findings, FoundEffect, Gain, Quantity
 from ema.effects import registry
 
 from . import controller, repeating
@@ -21,6 +21,7 @@ from .leave_out import over_folds, square
 from .noise import SEED as NOISE_SEED
 from .noise import Verdict
 from .plant import Point
+from .remains import Remains, remains
 from .search import CHANCE, FINAL_SEED, N_FINAL, Model, Search
 from .structure import structure
 from .weighing import WORTH_IT, is_enough
@@ -33,6 +34,7 @@ IN_LIBRARY = 0.99  # probability that what does it is in the library at all, whe
 LOUD, MOST = 1.3, 0.5  # misfit of a cycle that shows a rest; share of it that is worth a word
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
 SEEDS = {"noise": NOISE_SEED, "fit": SEED, "held out": FINAL_SEED}  # the first of each
+OF_NATS = {"evidence": "the evidence of the record", "held-out cycles": "what held-out cycles say"}
 NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none
 
 
@@ -46,36 +48,33 @@ def told(
     torque_lines = [c for c in after.effects if c.effect in ("cogging", "torque_line")]
     odd = [c for c in torque_lines if not _integer(after.fit, c.effect)]
     further = [c for c in torque_lines if c.effect == "torque_line" and not odd]
-    explained = v.is_noise or is_enough(after, before)
-    verdict: Literal["adequate", "explained", "unexplained"] = (
-        "adequate" if not after.effects and v.is_noise else "explained" if explained and not odd else "unexplained"
-    )
-    notes: list[str] = []
-    shape: dict[str, Any] = {}
+    kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c.effect != "torque_line" and c not in odd]
     left = after.excess / max(before.excess, 1e-9)
     share = 1.0 - left
-    too_little = verdict == "unexplained" and share < NAMED
-    if verdict == "unexplained" or (after.effects and not v.is_noise):
+    is_beside = bool(odd) or not (v.is_noise or is_enough(after, before))  # of a rest that nothing explains
+    too_little = is_beside and share < NAMED
+    made = remains(search, before, after, v, odd, named=bool(kept) and not too_little)
+    notes: list[str] = []
+    shape: dict[str, Any] = {}
+    if odd or not v.is_noise:
         base = Model((), before.fit, before.heldout) if odd or too_little else after  # beside what is named
         shape = structure(search.torques(base), search.plant.plant.control.rate, v.scores)
         shape["sentences"] += controller.said(search.plant.plant, search.plant.data.signals)
         shape["sentences"] += repeating.said(repeating.repeating(search, base.fit.point))
-    if verdict == "explained" and not v.is_noise:
-        notes.append("a small rest above noise is left: the true law has another form than the library's")
+    if made.is_little and not made.left.is_chance:
+        notes.append(f"{made.left.sentence} (p = {v.p_value:.1g})")
     if not search.plant.data.has_temperature:
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
-    kept = [(c, a) for c, a in zip(after.effects, alike, strict=False) if c.effect != "torque_line" and c not in odd]
     rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
     found = [_found(search, after, c.effect, a, rest, outcome) for c, a in kept]
-    if verdict == "unexplained":
+    if is_beside:
         found = [replace(e, confidence=UNCERTAIN_LAW * e.confidence) for e in found]
+        notes += _recorded_once(search, after)
     if too_little and found:
         notes.append(
             f"{', '.join(e.name for e in found)} would explain {share:.0%} of the rest: too little to be named"
         )
         found = []
-    if verdict == "unexplained":
-        notes += _recorded_once(search, after)
     for c in odd:
         at, amplitude = (after.fit.point[f"{c.effect}.{name}"] for name in ("order", "amplitude"))
         notes.append(f"a torque line at the non-integer order {at:.4g} is no cogging of this motor")
@@ -85,35 +84,52 @@ def told(
         {"name": " + ".join(m.names) or "faults only", "score": -m.heldout}
         for m in sorted(search.tried, key=lambda m: m.heldout)
     ]
-    unnamed = [_found(search, after, c.effect, (), rest, outcome, "torque_line") for c in (*odd, *further)][:1]
-    if further:
+    lines = [c for c in (*odd, *further) if c in made.model.effects]
+    unnamed = [_found(search, after, c.effect, (), rest, outcome, "torque_line") for c in lines][:1]
+    if further and unnamed:
         values = {name: q.value for name, q in unnamed[0].parameters.items()}
         unnamed = [replace(unnamed[0], sentence=f"a further {registry()['cogging'].said(values)}")]
         notes.append(f"beside it stands {unnamed[0].sentence}")
-    gain = _gain(search, before, after)
     return Findings(
-        graded(verdict, gain), found, gain, shape, tried, notes,
-        unnamed=unnamed, posterior=as_told(outcome), rejected=rejected(search, before, after), seeds=SEEDS,
+        made.verdict, found, _gain(search, before, made.model, made, outcome), shape, tried, notes,
+        unnamed=unnamed, posterior=as_told(outcome), rejected=rejected(search, before, after, outcome), seeds=SEEDS,
+        rest=0.0 if made.left.is_chance else made.left.residual.rest,
     )  # fmt: skip
 
 
-def rejected(search: Search, before: Model, after: Model) -> list[dict[str, Any]]:
-    """Sets of causes that were fitted and are not the answer, by what they leave of held-out cycles over noise."""
-    best: dict[str, float] = {}
+def rejected(search: Search, before: Model, after: Model, outcome: Outcome) -> list[dict[str, Any]]:
+    """Sets of causes that were fitted and are not the answer: how much less likely, and what they leave.
+
+    By the evidence of the record where a set was weighed so, else by held-out cycles, where both were judged by one
+    noise.
+    """
+    best: dict[frozenset[str], Model] = {}
     for m in search.tried:
-        if m.effects and set(m.names) != set(after.names):
-            name = " + ".join(sorted(m.names))
-            best[name] = min(m.heldout, best.get(name, np.inf))
-    answer = " + ".join(after.names) or "faults alone"
-    return [
-        {
-            "name": name,
-            "before": before.heldout,
-            "after": left,
-            "why": f"leaves {left:.3g} of held-out cycles where noise is 1; {answer}: {after.heldout:.3g}",
-        }
-        for name, left in sorted(best.items(), key=lambda item: item[1])
-    ]
+        key = frozenset(m.names)
+        if m.effects and key != frozenset(after.names) and m.heldout < best.get(key, m).heldout + 1e-12:
+            best[key] = m
+    weighed = {frozenset(w.entrant.names): w for w in outcome.weighed}
+    answer, own = " + ".join(after.names) or "faults alone", weighed.get(frozenset(after.names))
+    rows = []
+    for key, m in sorted(best.items(), key=lambda item: item[1].heldout):
+        nats = error = of = None
+        if own is not None and key in weighed:
+            nats, error = own.log_evidence - weighed[key].log_evidence, float(np.hypot(own.error, weighed[key].error))
+            of = "evidence"
+        elif m.by is not None and m.by is after.by:
+            nats, of = 0.5 * (m.heldout - after.heldout) * m.by.expected(search.heldout), "held-out cycles"
+        lost = f"{_behind(nats, error)} {answer} by {OF_NATS[of]}; " if nats is not None and of else ""
+        why = f"{lost}leaves {m.heldout:.3g} of held-out cycles where noise is 1; {answer}: {after.heldout:.3g}"
+        rows.append(
+            {"name": " + ".join(sorted(m.names)), "before": before.heldout, "after": m.heldout,
+             "nats": nats, "nats_error": error, "nats_of": of, "why": why}
+        )  # fmt: skip
+    return rows
+
+
+def _behind(nats: float, error: float | None) -> str:
+    about = f" ± {error:.1f}" if error else ""
+    return f"{abs(nats):.1f}{about} nats {'behind' if nats >= 0.0 else 'before'}"
 
 
 def _recorded_once(search: Search, model: Model) -> list[str]:
@@ -152,7 +168,19 @@ def with_function(search: Search, findings: Findings, before: Model, after: Mode
         unnamed = [FoundEffect(effect, 0.0, (), quantities, e.said(values), e.separated_by, e.place)]
         share = 1.0 - m.excess / base.excess
         findings.structure["sentences"].append(f"{e.said(values)}, takes {share:.0%} of the rest")
-        return replace(findings, unnamed=unnamed, gain=_gain(search, before, m)), m
+        error, _ = over_folds(search, before, m)
+        k_after = tuple(round(m.fit.point.get(n, 0.0), 5) for n in FAULTS)
+        after_it = replace(
+            findings.gain,
+            train_after=_envelope_error(search, m.fit.point, search.train),
+            heldout_after=error.err_after,
+            noise_floor=error.noise_floor,
+            k_after=k_after,
+            k_interval=(),
+            false_alarms_after=sum(x > FAULT_ALARM for x in k_after),
+            folds=error,
+        )
+        return replace(findings, unnamed=unnamed, gain=after_it), m
     return findings, after
 
 
@@ -184,7 +212,9 @@ def _found(
             sd = float(np.linalg.norm([*parts, e.least_sd.get(p.name, 0.0)]))
             f = bounds[name]
             values[p.name] = value
-            parameters[p.name] = Quantity(value, max(value - 1.96 * sd, f.low), min(value + 1.96 * sd, f.high), p.unit)
+            parameters[p.name] = Quantity(
+                value, max(value - WITHIN * sd, f.low), min(value + WITHIN * sd, f.high), p.unit
+            )
     own, *others = (IN_LIBRARY * p for p in probabilities(outcome, model, effect, *alike))
     return FoundEffect(e.name, own, alike, parameters, e.said(values), e.separated_by, e.place, of_others=sum(others))
 
@@ -203,19 +233,29 @@ def _envelope_error(search: Search, point: Point, cycles: list[int]) -> float:
     return float(np.sqrt(np.mean([square(search.plant, c, runs[c].envelopes.mean(axis=0)) for c in cycles])))
 
 
-def _gain(search: Search, before: Model, after: Model) -> Gain:
-    search.say("every cycle held out once")
-    folds = over_folds(search, before, after)
+def _gain(search: Search, before: Model, after: Model, made: Remains, outcome: Outcome) -> Gain:
     k_before, k_after = (tuple(round(m.fit.point.get(n, 0.0), 5) for n in FAULTS) for m in (before, after))
     return Gain(
         _envelope_error(search, before.fit.point, search.train),
         _envelope_error(search, after.fit.point, search.train),
-        folds.err_before,
-        folds.err_after,
-        folds.noise_floor,
+        made.error.err_before,
+        made.error.err_after,
+        made.error.noise_floor,
         k_before,
         k_after,
         sum(x > FAULT_ALARM for x in k_before),
         sum(x > FAULT_ALARM for x in k_after),
-        folds=folds,
+        tuple(_interval_of_fault(name, after, outcome) for name in FAULTS),
+        folds=made.error,
+        residual=made.left.residual,
     )
+
+
+def _interval_of_fault(name: str, model: Model, outcome: Outcome) -> tuple[float, float]:
+    """Interval of 95 %: the wider of the fit's and the score's, and where these disagree, both."""
+    k = model.fit.point.get(name, 0.0)
+    sd = model.fit.sd.get(name, 0.0)
+    own = next((w for w in outcome.weighed if set(w.entrant.names) == set(model.names)), None)
+    if own is not None and name in own.sd:
+        sd = float(np.hypot(max(sd, own.sd[name]), own.point[name] - k))
+    return max(k - WITHIN * sd, 0.0), min(k + WITHIN * sd, 1.0)

@@ -72,7 +72,7 @@ def _doubted(plant: AxisPlant, outcome: Outcome) -> str:
     """Another way that what was found, or not, may come from."""
     if plant.plant.drive == "speed-loop" and outcome.effects:
         return "fast" if plant.between == "straight" else "straight"
-    if plant.between != "straight" and outcome.verdict == "unexplained":
+    if plant.between != "straight" and outcome.verdict in ("partly explained", "unexplained"):
         return "straight"  # what looked like a drive that is held may have been something that is missing
     return plant.between
 

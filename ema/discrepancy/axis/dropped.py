@@ -52,7 +52,10 @@ def dropped(plant: AxisPlant, outcome: Outcome, named: set[str]) -> list[dict[st
         if max([share, *(s for s, _ in wider)]) > SHARE:
             after = float(np.sqrt(1.0 + _excess(fitted.residuals)))
             why = _why(plant, candidate, fitted, share, at, [text for _, text in wider])
-            told.append({"name": candidate.key, "before": float(np.sqrt(1.0 + here)), "after": after, "why": why})
+            unknown = dict.fromkeys(("nats", "nats_error", "nats_of"))  # held-out parts do not decide it
+            told.append(
+                {"name": candidate.key, "before": float(np.sqrt(1.0 + here)), "after": after, **unknown, "why": why}
+            )
     return told
 
 

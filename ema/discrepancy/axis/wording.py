@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from ema.discrepancy import findings as shared
+from ema.discrepancy.grade import graded
 from ema.discrepancy.outcome import Outcome
 from ema.effects import registry
 from ema.models.axis_config import LinearAxis
@@ -40,11 +41,16 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         outcome.heldout.noise_floor,
         tuple(outcome.k_before),
         tuple(outcome.k_after),
+        k_interval=tuple(
+            (k - shared.WITHIN * sd, k + shared.WITHIN * sd)
+            for k, sd in zip(outcome.k_after, outcome.k_error, strict=False)
+        ),
         k_names=tuple(outcome.base),
         what="error of the free run over the record's own size",
         scale=100.0,
         unit="%",
         folds=outcome.folds,
+        residual=outcome.left.residual if outcome.left else None,
     )
     structure = dict(outcome.structure)
     if structure:
@@ -53,9 +59,9 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     if outcome.verdict != "adequate":
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
     said = _balance(plant, outcome)
-    verdict = shared.graded(outcome.verdict, gain)
-    found, by_balance = together(plant, [_effect(e) for e in outcome.effects], verdict, outcome.point)
+    found, by_balance = together(plant, [_effect(e) for e in outcome.effects], outcome.verdict, outcome.point)
     found = with_external(plant, found)
+    verdict = graded(outcome.left, named=True) if by_balance is not None and outcome.left else outcome.verdict
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
     if plant.plant.neighbour is not None:
         notes.append(ALONE)
@@ -71,9 +77,16 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         [asdict(r) for r in outcome.records],
         _fitted(plant, outcome) if by_balance is None else _by_balance(plant, by_balance),
         rest=outcome.rest,
-        rejected=dropped(plant, outcome, {name for e in found for name in (e.name, *e.indistinguishable_from)}),
+        rejected=_rejected(plant, outcome, {name for e in found for name in (e.name, *e.indistinguishable_from)}),
         balance=said,
     )
+
+
+def _rejected(plant: AxisPlant, outcome: Outcome, named: set[str]) -> list[dict[str, Any]]:
+    """What lost to the answer, in nats; and what fits clearly better beside it and is no cause."""
+    better = dropped(plant, outcome, named)
+    there = {row["name"] for row in better}
+    return [*better, *(row for row in outcome.lost if row["name"] not in there | named)]
 
 
 def _balance(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:

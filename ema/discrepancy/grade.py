@@ -1,0 +1,82 @@
+"""The verdict: what is claimed of an answer, from what it leaves.
+
+A verdict against the simulation needs two things. What is left is no chance, which a calibrated test of the record
+says; and it is more than `LIMIT` times what noise makes, which held-out parts say. A test alone sees what is smaller
+than the noise; an error alone may be chance. Where the noise itself was estimated from the record, it may be larger
+than that: "within" then means within `LIMIT` times the most that it may be. "Explained" claims something, and its error
+is held against the estimate.
+
+=========================  =================================================  ==================================
+what the test of all says  what is left of held-out parts                     no cause named  /  causes named
+=========================  =================================================  ==================================
+noise                      error within `LIMIT`                               adequate        /  explained
+noise                      error beyond                                       adequate        /  partly explained
+not noise                  error and residual within `LIMIT`                  adequate, note  /  explained, note
+not noise                  error within; residual beyond, no more than the    unexplained     /  explained, note
+                           form of the laws that are named may leave
+not noise                  anything else                                      unexplained     /  partly explained
+=========================  =================================================  ==================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from .folds import Folds
+
+Verdict = Literal["adequate", "explained", "partly explained", "unexplained", "unfinished"]
+UPPER = 1.645  # deviations, that an estimate exceeds with a probability of 5 %
+LIMIT = 1.2  # times what noise makes of held-out parts, beyond which a record is not explained
+
+
+@dataclass(frozen=True)
+class Left:
+    """What the causes that are named leave; what was fitted without a name counts as left.
+
+    Attributes
+    ----------
+    is_chance : bool
+        A test of the whole record finds nothing but noise.
+    error : Folds
+        Errors in the plant's own unit, of parts that were held out.
+    residual : Folds
+        The same of the residual weighed by its noise, which sees more.
+    is_form : bool
+        No more is left of the residual than laws of another form may leave.
+    noise_uncertainty : float
+        Relative standard deviation of the noise's amplitude; 0 where it is known.
+    """
+
+    is_chance: bool
+    error: Folds
+    residual: Folds
+    is_form: bool = False
+    noise_uncertainty: float = 0.0
+
+    @property
+    def allowed(self) -> float:
+        """How many times the estimated noise may be left before a rest is sure."""
+        return LIMIT * (1.0 + UPPER * self.noise_uncertainty)
+
+    @property
+    def most(self) -> float:
+        """Error or residual over what noise makes of it, whichever is larger; 1 is noise."""
+        return max(self.error.rest, self.residual.rest)
+
+    @property
+    def sentence(self) -> str:
+        """How much is left where it is not noise, in words."""
+        return (
+            f"a test of the whole record still sees what is no chance: held out one by one, {len(self.error.names)} "
+            f"parts leave {self.error.told_rest} times the noise in their error and {self.residual.told_rest} times in "
+            "the residual weighed by its noise"
+        )
+
+
+def graded(left: Left, *, named: bool) -> Verdict:
+    """The verdict on what `left` says, with causes `named` or without any."""
+    if not named:
+        return "adequate" if left.is_chance or left.most <= left.allowed else "unexplained"
+    is_little = left.is_chance or left.is_form or left.residual.rest <= left.allowed
+    return "explained" if is_little and left.error.rest <= LIMIT else "partly explained"

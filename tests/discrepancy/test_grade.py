@@ -1,0 +1,89 @@
+"""The verdict claims no more than what held-out parts and the test of the whole record say together."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from ema.discrepancy.findings import Findings, FoundEffect, Gain
+from ema.discrepancy.folds import Folds
+from ema.discrepancy.grade import LIMIT, Left, graded
+
+SPRING = FoundEffect("spring_load", 0.99, (), {}, "a spring", "slow motion")
+
+
+def folds(*rests):
+    """Parts that leave so many times what noise makes of them."""
+    after = tuple((0.01 * np.array(rests)) ** 2)
+    n = len(rests)
+    return Folds(tuple(f"cycle {j}" for j in range(n)), (1e-2,) * n, after, (1e-4,) * n, (1.0,) * n)
+
+
+def left(is_chance, error, residual, is_form=False):
+    return Left(is_chance, folds(error, error), folds(residual, residual), is_form)
+
+
+@pytest.mark.parametrize(
+    ("of", "nothing_named", "causes_named"),
+    [  # chance, error, residual, form of a law
+        ((True, 1.0, 1.0), "adequate", "explained"),
+        ((True, 1.1, 1.1), "adequate", "explained"),
+        ((True, 1.3, 1.3), "adequate", "partly explained"),  # no alarm without a test that says so, and no claim
+        ((False, 0.71, 1.01), "adequate", "explained"),  # correlation that is smaller than the noise
+        ((False, 1.07, 1.07), "adequate", "explained"),
+        ((False, 1.16, 10.7), "unexplained", "partly explained"),  # an envelope that hides it
+        ((False, 1.3, 1.0), "unexplained", "partly explained"),
+        ((False, 8.0, 30.0), "unexplained", "partly explained"),
+        ((False, 1.1, 4.0, True), "unexplained", "explained"),  # a law of another form, too small to be felt
+        ((False, 1.3, 4.0, True), "unexplained", "partly explained"),
+    ],
+)
+def test_the_truth_table(of, nothing_named, causes_named):
+    assert graded(left(*of), named=False) == nothing_named
+    assert graded(left(*of), named=True) == causes_named
+
+
+def test_every_case_of_it_holds_what_is_promised():
+    """Never explained beyond the limit; a rest needs both that it is no chance and that it is there."""
+    around = (0.5, LIMIT - 0.01, LIMIT + 0.01, 50.0)
+    for chance, error, residual, form in itertools.product((True, False), around, around, (True, False)):
+        of = left(chance, error, residual, form)
+        if error > LIMIT:
+            assert graded(of, named=True) == "partly explained"
+        if chance or max(error, residual) <= LIMIT:
+            assert graded(of, named=False) == "adequate"
+        else:
+            assert graded(of, named=False) == "unexplained"
+
+
+def test_noise_that_was_estimated_may_be_larger_and_nothing_is_claimed_by_that():
+    """A cascade with nothing hidden left 0.71 floors of error and 1.25 of residual, by a noise known to 10 %."""
+    known, estimated = (Left(False, folds(0.7, 0.7), folds(1.2, 1.3), noise_uncertainty=u) for u in (0.0, 0.1))
+    assert [graded(of, named=False) for of in (known, estimated)] == ["unexplained", "adequate"]
+    assert graded(Left(False, folds(5.0, 4.0), folds(9.0, 9.0), noise_uncertainty=0.1), named=False) == "unexplained"
+    loud = Left(False, folds(1.25, 1.25), folds(1.0, 1.0), noise_uncertainty=0.1)
+    assert graded(loud, named=True) == "partly explained"
+
+
+def test_one_lucky_part_does_not_make_it_explained():
+    """The part that a single split would have held out is at noise; the others are not."""
+    unlucky = folds(1.0, 1.5, 1.5, 1.5, 1.5, 1.5)
+    assert graded(Left(False, folds(1.0), folds(1.0)), named=True) == "explained"
+    assert graded(Left(False, unlucky, folds(1.0)), named=True) == "partly explained"
+
+
+def test_what_is_small_is_told_with_its_error():
+    said = Left(False, folds(0.7, 0.9), folds(1.0, 1.1)).sentence
+    assert "0.806 ± 0.1 times the noise in their error" in said
+    assert "1.05 ± 0.05 times in the residual" in said
+
+
+def test_what_is_left_is_told_by_what_sees_more():
+    gain = Gain(1.0, 0.1, 1.0, 0.1, 0.1, folds=folds(1.0, 1.0), residual=folds(4.0, 5.0))
+    said = Findings("partly explained", [SPRING], gain).sentences()
+    assert "4.53 times what noise makes" in said[-1]
+    assert Findings("partly explained", [SPRING], gain).as_dict()["gain"]["residual"]["rest"] == pytest.approx(
+        4.53, abs=0.01
+    )
