@@ -93,11 +93,12 @@ def map_columns(file: Path, write: bool) -> None:
 
     from .proposed_sidecar import as_sidecar, table_of
 
-    proposals = propose(table_of(file))
+    table, side = table_of(file)
+    proposals = propose(table)
     beside = sidecar.beside(file)
     if write:
         require_new(beside, SEE_IT)
-    text = as_sidecar(file.name, proposals)
+    text = as_sidecar(file.name, proposals, side)
     if not any(one.channel == "t" for one in proposals):
         click.echo(text, nl=False)
         raise NegativeAnswer(

@@ -61,6 +61,18 @@ def read_text(path: Path, side: Sidecar) -> Table:
     return Table(path, header, numbers, lines, "line", units)
 
 
+def above_titles(path: Path, side: Sidecar) -> int:
+    """Lines above the titles: the row before the first numbers, or the one before that where it holds units."""
+    numbered = _lines(path, side)
+    numeric = [_is_numeric(text) and len(text.replace(",", " ").replace(";", " ").split()) > 1 for _, text in numbered]
+    first = next((k for k in range(1, len(numeric)) if all(numeric[k : k + 3])), 1)
+    titles = first - 1
+    if titles > 0:
+        dialect = _dialect([text for _, text in numbered[titles : titles + _LOOKED_AT]], side)
+        titles -= _units(dialect, numbered[titles][1]) is not None
+    return numbered[titles][0] - 1 if titles > 0 else 0
+
+
 def _lines(path: Path, side: Sidecar) -> list[tuple[int, str]]:
     """Header and rows with their place in the file; blank lines and comments are left out."""
     try:

@@ -18,6 +18,7 @@ _SUPPLY = {"dc", "bus", "supply", "vbus", "udc", "vdc", "battery", "batt", "vsup
 _OUTPUT = {"user", "output", "load", "lvdt", "surface", "ram"}
 _PHASE = {"a": "i_a", "b": "i_b", "c": "i_c", "u": "i_a", "v": "i_b", "w": "i_c"}
 _PHASES = re.compile(r"(?:i|cur|current|phase|iphase|i ?phase)[ _]*([abcuvw])$")
+_COUNTS = {"count", "counts", "ticks", "cnt", "cnts", "inc", "increments", "lsb"}
 # What is measured, by its unit where the file gives one, else by the words of the title.
 _UNITS = {
     "time": "s", "angle": "rad", "length": "m", "turning": "rad/s", "speed": "m/s", "current": "A", "voltage": "V",
@@ -54,10 +55,15 @@ def propose(table: Table) -> list[Proposal]:
     is_linear = any(what in ("length", "force", "speed") for what, _ in seen)
     is_actuator = sum(_PHASES.search(_plain(title)) is not None for title in table.header) >= 2
     taken: dict[str, str] = {}
-    found = []
+    found: list[Proposal] = []
     for title, (what, unit) in zip(table.header, seen, strict=True):
         channel = _channel(title, what, is_linear, is_actuator)
-        if channel is None:
+        if channel is not None and _is_counted(title, table.units.get(len(found))):
+            said = (
+                f"counts of an encoder: {{channel: {channel}, unit: turn, scale: 2.44140625e-4}} where 4096 are a turn"
+            )
+            found.append(Proposal(title, None, None, said))
+        elif channel is None:
             found.append(Proposal(title, None, None, "no channel of an axis or an actuator by its title and unit"))
         elif channel in taken:
             found.append(Proposal(title, None, None, f"looks like {channel} too, as '{taken[channel]}' does"))
@@ -76,6 +82,12 @@ def _plain(title: str) -> str:
     return re.sub(r"[^a-z0-9]+", " ", name.lower()).strip()
 
 
+def _is_counted(title: str, apart: str | None) -> bool:
+    """Whether a column is in counts, whose angle only its owner knows."""
+    unit = titled(title)[1] or apart
+    return (unit.lower() if unit else _plain(title).split(" ")[-1]) in _COUNTS
+
+
 def _quantity(title: str, apart: str | None) -> tuple[str | None, str | None]:
     """What is measured and its unit, None where not known; a unit of the file counts more than a word."""
     unit = titled(title)[1] or apart
@@ -84,6 +96,10 @@ def _quantity(title: str, apart: str | None) -> tuple[str | None, str | None]:
             if _converts(unit, target):
                 return what, unit
     words = _plain(title).split()
+    if "rpm" in words:
+        return "turning", "rpm"
+    if set(words) & _COMMAND and (ending := _ending(title, "")) is not None:
+        return next((what for what, target in _UNITS.items() if _converts(ending, target)), None), ending
     for what, known in _WORDS.items():
         if set(words) & set(known.split()):
             if (ending := _ending(title, what)) is None:
@@ -96,6 +112,8 @@ def _quantity(title: str, apart: str | None) -> tuple[str | None, str | None]:
 def _ending(title: str, what: str) -> str | None:
     """The unit in the last part of a title such as ``pos_deg`` or ``torque Nm``, None where it is none."""
     parts = re.split(r"[_ ]+", titled(title)[0].strip())
+    if len(parts) > 2 and any(_converts("/".join(parts[-2:]), _UNITS[rate]) for rate in ("turning", "speed")):
+        return "/".join(parts[-2:])  # joint_vel_deg_s
     long = len(parts[-1]) > 1 or what == "time"  # a single letter is a phase more often than a unit
     known = len(parts) > 1 and long and any(_converts(parts[-1], unit) for unit in _UNITS.values())
     return parts[-1] if known else None

@@ -101,3 +101,31 @@ def test_a_file_without_a_known_time_names_the_command(tmp_path):
 def test_what_is_no_file_is_refused_in_one_line(path, said):
     with pytest.raises(RecordError, match=f"cannot be read .*{said}"):
         CliRunner().invoke(cli, ["records", "map", path], catch_exceptions=False)
+
+
+def test_a_drive_log_of_counts_and_revolutions(tmp_path):
+    _, answer = mapped(tmp_path, "time[us],pos[counts],rpm,rpm_setpoint,joint_vel_deg_s,setpoint_deg")
+    assert channels(answer) == {
+        "time[us]": ("t", "us"),
+        "pos[counts]": "ignore",
+        "rpm": ("w_m", "rpm"),
+        "rpm_setpoint": ("w_ref", "rpm"),
+        "joint_vel_deg_s": "ignore",
+        "setpoint_deg": ("theta_ref", "deg"),
+    }
+    assert "{channel: theta_m, unit: turn, scale: 2.44140625e-4} where 4096 are a turn" in answer.stdout
+    _, answer = mapped(tmp_path, "time_s,joint_vel_deg_s,link_torque_Nm")
+    assert channels(answer)["joint_vel_deg_s"] == ("w_m", "deg/s")
+
+
+def test_lines_above_the_titles_and_an_old_encoding_are_told(tmp_path):
+    path = tmp_path / "riemen.csv"
+    rows = "".join(f"0,{k:03d};1,5;0,2{k}\n" for k in range(5))
+    path.write_bytes(f"Prüfstand Riemenachse;;\n\nZeit;Istposition;Motorstrom\ns;mm;A\n{rows}".encode("cp1252"))
+    answer = CliRunner().invoke(cli, ["records", "map", str(path), "--write"], catch_exceptions=False)
+    assert answer.exit_code == 0
+    side = yaml.safe_load(path.with_name("riemen.record.yaml").read_text())
+    assert (side["encoding"], side["skip_rows"]) == ("cp1252", 2)
+    record = read_record(path)
+    assert {"t", "i_q"} <= set(record.channels)
+    assert record.cycles[0]["i_q"][1] == 0.21
