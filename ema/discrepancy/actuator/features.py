@@ -27,6 +27,7 @@ from numba import njit, vectorize
 from numpy.typing import NDArray
 
 from ema.effects.trapezoid import sector, six_step, trap
+from ema.models import jit  # noqa: F401  where compiled functions are kept
 from ema.models.actuator import Actuator
 
 Array = NDArray[np.float64]
@@ -49,8 +50,8 @@ GROUPS = {
     "supply": (10e-3, 0.02, "V"),
 }
 
-_trap = vectorize(nopython=True)(lambda x: trap(x))
-_six_step = vectorize(nopython=True)(lambda x: six_step(sector(x)))
+_trap = vectorize(nopython=True, cache=True)(lambda x: trap(x))
+_six_step = vectorize(nopython=True, cache=True)(lambda x: six_step(sector(x)))
 PHASE = np.array([0.0, 2.0, 4.0])[:, None] * np.pi / 3.0
 
 
@@ -111,7 +112,7 @@ def delayed(x: Array, samples: float) -> Array:
     return np.asarray((1.0 - share) * padded[..., 1 : 1 + n] + share * padded[..., :n])
 
 
-@njit(cache=False, nogil=True)
+@njit(cache=True, nogil=True)
 def _table(i: Array, sector: Array, sign: Array) -> Array:
     """Mean of each phase's current in each sector, plain and times the sign of the current: (n, 2, 3, SECTORS).
 

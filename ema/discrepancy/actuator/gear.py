@@ -22,6 +22,7 @@ from scipy.optimize import least_squares, minimize
 from ema.effects.backlash import deflection
 from ema.effects.dry_friction import rubbing_speed_after
 from ema.faults import backlash
+from ema.models import jit  # noqa: F401  where compiled functions are kept
 from ema.models.actuator import Actuator
 
 from .conditions import roughness
@@ -78,7 +79,7 @@ class Gear(NamedTuple):
         return self.w_0 < FREQUENCIES[-1] and self.zeta + 0.5 * self.drag / self.w_0 < RINGS
 
 
-@njit(nogil=True)
+@njit(cache=True, nogil=True)
 def _user(shaft: Array, start: Array, gear: Gear, T: float) -> Array:
     """θ_u of a user behind a spring, driven by θ_m/GR; `start`: its θ_u and ω_u. [rad]"""
     w_0, zeta, b, drag, friction = gear

@@ -10,7 +10,7 @@ import numpy as np
 from ema.discrepancy.folds import Folds, dealt
 
 from .features import Array
-from .fit import bounded, bounds, columns, moved, residuals, stacked_jacobian
+from .fit import SEED, bounded, bounds, columns, moved, residuals, stacked_jacobian
 from .plant import ENVELOPE_STEP, EmaPlant, Point
 from .search import FINAL_SEED, N_FINAL, N_GLANCE, Model, Search
 
@@ -43,14 +43,25 @@ class _Linear:
         cost = {c: float(x @ x) for c, x in glance.items()}
         return cls(model, r, {c: stacked_jacobian(noise, frees, cols, [c]) for c in cycles}, cost)
 
-    def fitted_to(self, search: Search, cycles: list[int]) -> Point:
-        """One step of Gauss–Newton from the point; the point itself where simulation says that the step leads away."""
+    def stepped(self, cycles: list[int]) -> Point:
+        """Where one step of Gauss–Newton from the point leads that fits it to some cycles."""
         frees, point = self.model.fit.free, self.model.fit.point
         J, r = (np.concatenate([of[c] for c in cycles]) for of in (self.J, self.r))
         step, _ = bounded(J, r, *bounds(frees, point))
-        there = moved(point, frees, step)
-        (gone,) = search.costs([there], cycles, typical=False)
-        return there if gone < sum(self.cost[c] for c in cycles) else point
+        return moved(point, frees, step)
+
+
+def _fitted(search: Search, of: list[tuple[_Linear, list[int]]]) -> list[Point]:
+    """Models fitted to some cycles each; the point itself where simulation says that the step leads away."""
+    plant = search.plant
+    stepped = [m.stepped(cycles) for m, cycles in of]
+    runs = plant.each([(there, cycles) for there, (_, cycles) in zip(stepped, of, strict=True)], N_GLANCE, SEED)
+    points = []
+    for there, (m, cycles), at in zip(stepped, of, runs, strict=True):
+        left = (search.noise.of(c).white(plant.data.y[c] - at[c].features.mean(axis=0)) for c in cycles)
+        gone, here = sum(float(x @ x) for x in left), sum(m.cost[c] for c in cycles)
+        points.append(there if gone < here else m.model.fit.point)
+    return points
 
 
 def over_folds(search: Search, before: Model, after: Model) -> tuple[Folds, Folds]:
@@ -63,17 +74,17 @@ def over_folds(search: Search, before: Model, after: Model) -> tuple[Folds, Fold
     plant, data, noise = search.plant, search.plant.data, search.noise
     cycles = sorted(range(data.n_cycles), key=lambda c: (int(data.motion[c]), c))
     models = [before] if after is before else [before, after]
-    linear = [_Linear.of(search, m, cycles) for m in models]
     squares: list[dict[int, float]] = [{} for _ in models]
     residual: list[dict[int, float]] = [{} for _ in models]
-    for fold in dealt(cycles, N_FOLDS):
-        rest = [c for c in cycles if c not in fold]
-        points = [m.fitted_to(search, rest) for m in linear]
-        runs = plant.repeated(points, fold, N_FINAL, FINAL_SEED)
-        for of, whitened, at in zip(squares, residual, runs, strict=True):
-            of |= {c: square(plant, c, at[c].envelopes.mean(axis=0)) for c in fold}
-            left = {c: noise.of(c).white(data.y[c] - at[c].features.mean(axis=0)) for c in fold}
-            whitened |= {c: float(np.mean(x**2)) for c, x in left.items()}
+    parts = dealt(cycles, N_FOLDS)
+    linear = [_Linear.of(search, m, cycles) for m in models]
+    points = _fitted(search, [(m, [c for c in cycles if c not in part]) for m in linear for part in parts])
+    turns = [(of, whitened, part) for of, whitened in zip(squares, residual, strict=True) for part in parts]
+    runs = plant.each([(point, part) for point, (*_, part) in zip(points, turns, strict=True)], N_FINAL, FINAL_SEED)
+    for (of, whitened, part), at in zip(turns, runs, strict=True):
+        of |= {c: square(plant, c, at[c].envelopes.mean(axis=0)) for c in part}
+        left = {c: noise.of(c).white(data.y[c] - at[c].features.mean(axis=0)) for c in part}
+        whitened |= {c: float(np.mean(x**2)) for c, x in left.items()}
     order = sorted(cycles)
 
     def folds(of: Sequence[dict[int, float]], floor: Callable[[Search, int], float], weight: Sequence[float]) -> Folds:

@@ -159,17 +159,29 @@ class EmaPlant:
         self, points: Sequence[Point], cycles: Sequence[int], n_seeds: int, seed: int, steps: Steps = None
     ) -> list[dict[int, Runs]]:
         """Runs of several cycles at several points, by cycle; each cycle has its own seeds, which all points share."""
-        found: list[dict[int, Runs]] = [{} for _ in points]
-        n_times = [len(self.data.commands[self.data.motion[c]]) for c in cycles]
+        return self.each([(point, cycles) for point in points], n_seeds, seed, steps)
+
+    def each(
+        self, wanted: Sequence[tuple[Point, Sequence[int]]], n_seeds: int, seed: int, steps: Steps = None
+    ) -> list[dict[int, Runs]]:
+        """The same of several points with cycles of their own, all in the same batches of lanes."""
+        found: list[dict[int, Runs]] = [{} for _ in wanted]
+        n_times = [len(command) for command in self.data.commands]
         for length in sorted(set(n_times)):
-            same = [c for c, n in zip(cycles, n_times, strict=True) if n == length]
-            grid = [(p, c, j) for p in range(len(points)) for c in same for j in range(n_seeds)]
-            seeds = [seed + 1000 * c + j for _, c, j in grid]
-            runs = self.simulate([points[p] for p, _, _ in grid], [c for _, c, _ in grid], seeds, steps)
-            shape = len(points), len(same), n_seeds, -1
-            both = zip(runs.features.reshape(shape), runs.envelopes.reshape(shape), strict=True)
-            for at, (x, envelopes) in zip(found, both, strict=True):
-                at |= {c: Runs(*of) for c, *of in zip(same, x, envelopes, strict=True)}
+            same = [
+                (of, point, c)
+                for of, (point, cycles) in zip(found, wanted, strict=True)
+                for c in cycles
+                if n_times[self.data.motion[c]] == length
+            ]
+            grid = [(point, c, seed + 1000 * c + j) for _, point, c in same for j in range(n_seeds)]
+            if not grid:
+                continue
+            points, of_cycle, seeds = zip(*grid, strict=True)
+            runs = self.simulate(points, of_cycle, seeds, steps)
+            for at, (of, _, c) in enumerate(same):
+                here = slice(at * n_seeds, (at + 1) * n_seeds)
+                of[c] = Runs(runs.features[here], runs.envelopes[here])
         return found
 
     def means(

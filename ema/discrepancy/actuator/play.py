@@ -16,6 +16,7 @@ from numba import njit
 from ema import faults
 from ema.discrepancy.findings import Findings
 from ema.effects.backlash import follow
+from ema.models import jit  # noqa: F401  where compiled functions are kept
 from ema.models.actuator import Actuator
 
 from .cycles import Measured
@@ -97,7 +98,7 @@ def held_user(shaft: Array, start: float, b: float) -> Array:
     return np.asarray(_user(shaft, start, b, 1.0, 0.0, np.inf))
 
 
-@njit(nogil=True)
+@njit(cache=True, nogil=True)
 def _user(shaft: Array, start: float, b: float, side: float, centre: float, holds: float) -> Array:
     """θ_u behind a play, from where it starts. [rad]"""
     user = np.empty(len(shaft))

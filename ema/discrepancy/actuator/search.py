@@ -65,6 +65,11 @@ class Search:
     columns: dict[tuple[int, str], Array] = field(default_factory=dict)
     probed: dict[str, Candidate] = field(default_factory=dict)
     tried: list[Model] = field(default_factory=list)
+    minima: list[tuple[Fit, Noise]] = field(default_factory=list)
+
+    def is_settled(self, model: Model) -> bool:
+        """Whether `model` was brought to its minimum already, by the noise that weighs now."""
+        return any(model.fit is fit and self.noise is noise for fit, noise in self.minima)
 
     def model(
         self,

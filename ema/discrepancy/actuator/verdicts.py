@@ -48,8 +48,14 @@ def as_on_the_bench(search: Search, model: Model, v: Verdict, share: float = CLE
 
 def at_the_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     """`model` with faults and effects told apart that look nearly the same, as far as the record allows."""
-    if not model.effects or model.excess > DISTANT:
+    if not model.effects or model.excess > DISTANT or search.is_settled(model):
         return model, v
+    model, v = _at_the_minimum(search, model, v)
+    search.minima.append((model.fit, search.noise))
+    return model, v
+
+
+def _at_the_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     again = _begun_again(search, model)
     if again is not model:
         model, v = again, search.verdict(again)
