@@ -14,6 +14,13 @@ if TYPE_CHECKING:
     from ema.discrepancy.records.naming import Proposal
 
 
+SAID = {
+    "at_rest": "  # no column looks like a time: readings at rest, one after the other? else map a counter as t",
+    "encoding": "  # it is no UTF-8",
+    "skip_rows": "  # lines above the titles",
+}
+
+
 def table_of(path: Path) -> tuple[Table, Sidecar]:
     """The table in a file of any kind that has columns, and how a text is to be read; RecordError in one line."""
     from ema.core import binary_tables, sidecar
@@ -43,7 +50,9 @@ def table_of(path: Path) -> tuple[Table, Sidecar]:
 
 def as_sidecar(name: str, proposals: Sequence[Proposal], side: Sidecar) -> str:
     """YAML of a sidecar for the file `name`."""
-    form = [f"{key}: {value}" for key, value in side.model_dump(exclude_defaults=True).items()]
+    form = [
+        f"{key}: {_scalar(value)}{SAID.get(key, '')}" for key, value in side.model_dump(exclude_defaults=True).items()
+    ]
     lines = [
         f"# What the columns of {name} seem to be, by title and unit. Read it, and mend what is not so.",
         *form,
@@ -59,7 +68,7 @@ def _mapping(one: Proposal) -> str:
     return f"{{channel: {one.channel}, unit: {_scalar(one.unit)}}}"
 
 
-def _scalar(text: str | None) -> str:
+def _scalar(text: str | float | None) -> str:
     """As YAML writes a text: in quotes where it would be read as something else."""
     said: str = yaml.safe_dump([text], default_flow_style=True, allow_unicode=True, width=1000)
     return said.strip()[1:-1]

@@ -79,7 +79,8 @@ def check(files: tuple[Path, ...], plant: Path | None, picture: Path | None, as_
 @click.option("--write", is_flag=True, help="write it beside FILE, as NAME.record.yaml; must not exist")
 def map_columns(file: Path, write: bool) -> None:
     """Propose a sidecar for FILE by its titles and units: what each column is, and what to look at. Read it, mend it:
-    nothing is read by a guess unless the sidecar says so. Exit status 1 if no column looks like a time.
+    nothing is read by a guess unless the sidecar says so. Exit status 1 if no column looks like a time, and none like
+    what holds an axis in its place.
 
     \b
     Examples:
@@ -98,8 +99,11 @@ def map_columns(file: Path, write: bool) -> None:
     beside = sidecar.beside(file)
     if write:
         require_new(beside, SEE_IT)
+    seen = {one.channel for one in proposals}
+    if "t" not in seen and seen & {"theta_m", "q"} and seen & {"i_q", "torque", "force"}:
+        side = side.model_copy(update={"at_rest": True})  # what holds the axis, over its place
     text = as_sidecar(file.name, proposals, side)
-    if not any(one.channel == "t" for one in proposals):
+    if "t" not in seen and not side.at_rest:
         click.echo(text, nl=False)
         raise NegativeAnswer(
             f"{file}: no column looks like a time; map one by hand (a counter: {{channel: t, unit: s, scale: PERIOD}})"

@@ -84,6 +84,10 @@ class Sidecar(Settings):
     encoding: Literal["utf-8-sig", "utf-8", "latin-1", "cp1252", "utf-16"] = "utf-8-sig"
     skip_rows: int = Field(default=0, ge=0, description="lines above the header")
     comment: str | None = Field(default=None, min_length=1, description="lines beginning with this text are skipped")
+    at_rest: bool = Field(
+        default=False,
+        description="rows are readings at rest, or in the slowest motion, one after the other: a file without time",
+    )
     cycles: Cycles | None = None
     note: str = ""
     _shared: bool = PrivateAttr(default=False)

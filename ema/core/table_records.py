@@ -34,6 +34,8 @@ def record_of(table: Table, side: sidecar.Sidecar) -> Record:
         channels[name] = scale * values[index] + offset
         if step is not None:
             resolution[name] = step
+    if side.at_rest:
+        channels = _at_rest(channels, len(table.lines))
     if "t" not in channels:
         raise RecordError(
             f"{path}: missing column 't [s]' (columns: {', '.join(header)}); where it has another title, "
@@ -44,6 +46,12 @@ def record_of(table: Table, side: sidecar.Sidecar) -> Record:
     marks = values[header.index(rule)] if rule else None
     cycles = tuple(_cycles(table, side, channels, number, marks))
     return Record(cycles, path, ignored, resolution)
+
+
+def _at_rest(channels: dict[str, Array], n: int) -> dict[str, Array]:
+    """Readings that follow each other: time counts them, and nothing moves."""
+    speed = "v" if "q" in channels else "w_m"
+    return {**channels, "t": np.arange(float(n)), speed: np.zeros(n)}
 
 
 def titled(title: str) -> tuple[str, str | None]:

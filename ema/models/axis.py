@@ -57,7 +57,7 @@ def model(
     values |= {"J" if name == "M" else name: value for name, value in changed.items()}
     if "F_d" in changed or values["F_s"] is None:
         values["F_s"] = ratio * float(values["F_d"] or 0.0)
-    if values["k_t"] is None:
+    if values["k_t"] is None or plant.is_force:
         values["k_t"] = 1.0
     for name, value in values.items():
         z[row(name)] = 0.0 if value is None else value

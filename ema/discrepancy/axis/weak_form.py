@@ -107,7 +107,7 @@ def weak_form(plant: Measured, point: Point, blocks: Sequence[int]) -> Weak:
         zero = zeros.get(b.name, 0.0)
         if w.static:
             assert w.direction is not None
-            k_t = float(plant.plant.k_t or 1.0)
+            k_t = 1.0 if plant.plant.is_force else float(plant.plant.k_t or 1.0)
             held = axis.holding(model, w.position + zero, w.direction, w.t)
             y = k_t * (w.drive - held)
             index = np.arange(w.n)[:, None] + offset

@@ -63,7 +63,7 @@ def first_fit(records: Sequence[Record], position: str, speed: str, drive: Seque
 
 def _weak(record: Record, position: str, speed: str, taus: Sequence[Array]) -> Weak | None:
     """Drive and motion of a record through the filter of the derivative; None where it hardly moves."""
-    own = speed in record.channels
+    own = speed in record.channels and any(cycle[speed].any() for cycle in record.cycles)  # not at rest
     kernel = np.convolve(BOX if own else SLOPE, SLOPE)
     reach = len(kernel) // 2
     motions: list[tuple[Array, ...]] = []

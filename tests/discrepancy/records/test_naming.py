@@ -10,6 +10,10 @@ from click.testing import CliRunner
 from ema.cli import cli
 from ema.core.errors import ConfigError, NegativeAnswer, RecordError
 from ema.core.records import read_record
+from ema.discrepancy.axis.balance.of_records import balance
+from ema.discrepancy.axis.balance.telling import told
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.models import axis_config
 
 
 def mapped(tmp_path, titles, units="", *options):
@@ -86,7 +90,7 @@ def test_what_is_written_is_read_and_not_written_over(tmp_path):
 
 def test_without_a_time_the_answer_is_no(tmp_path):
     with pytest.raises(NegativeAnswer, match="no column looks like a time"):
-        mapped(tmp_path, "position [rad],current [A]")
+        mapped(tmp_path, "position [rad],winding (°C)")
 
 
 def test_a_file_without_a_known_time_names_the_command(tmp_path):
@@ -129,3 +133,24 @@ def test_lines_above_the_titles_and_an_old_encoding_are_told(tmp_path):
     record = read_record(path)
     assert {"t", "i_q"} <= set(record.channels)
     assert record.cycles[0]["i_q"][1] == 0.21
+
+
+def test_a_map_of_torque_over_angle_is_readings_at_rest(tmp_path):
+    path = tmp_path / "map.txt"
+    up = np.arange(0.0, 360.0, 0.5)
+    angle, direction = np.concatenate([up, up[::-1]]), np.repeat([1.0, -1.0], len(up))
+    torque = 3.5 * direction + 8.0 * np.sin(np.deg2rad(36.0 * angle) + 0.4)
+    torque += 0.25 * np.random.default_rng(1).standard_normal(len(torque))
+    rows = "\n".join(f"{a:.1f}\t{b:.4f}" for a, b in zip(angle, torque, strict=True))
+    path.write_text(f"angle_deg\ttorque_mNm\n{rows}\n")
+    run = CliRunner()
+    assert run.invoke(cli, ["records", "map", str(path), "--write"], catch_exceptions=False).exit_code == 0
+    assert "at_rest: true" in path.with_name("map.record.yaml").read_text()
+    out = tmp_path / "plant.yaml"
+    done = run.invoke(cli, ["plant", "init", str(path), "--out", str(out)], catch_exceptions=False)
+    assert done.exit_code == 0
+    plant = axis_config.load(out)
+    assert pytest.approx(3.5e-3, rel=0.1) == plant.F_d
+    (term,) = told(balance(AxisPlant(plant, [read_record(path)])), linear=False)["terms"]
+    values = {name: q["value"] for name, q in term["parameters"].items()}
+    assert values == pytest.approx({"amplitude": 8e-3, "order": 36.0, "phase": 0.4}, rel=0.02)

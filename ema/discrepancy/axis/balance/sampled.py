@@ -52,7 +52,7 @@ def at_rest(plant: Measured, model: axis.Model, c: Course) -> Motion:
     """An axis that is held at rest, reading by reading."""
     assert c.position is not None
     assert c.direction is not None
-    k_t = float(plant.plant.k_t or 1.0)
+    k_t = 1.0 if plant.plant.is_force else float(plant.plant.k_t or 1.0)
     theta = c.position + c.zero
     held = axis.holding(model, theta, c.direction, c.t)
     zero = np.zeros(len(c.t))
