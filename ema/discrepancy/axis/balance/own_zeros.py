@@ -40,8 +40,8 @@ def with_zeros(plant: Measured, recorded: Sequence[Course], plain: Plain) -> lis
         for k, name in enumerate(names)
     }
     reference = next(name for name in names if name not in plant.zeros)
-    angles = {
-        name: between({n: z[reference][n] for n in own if n in z[reference]}, z[name]).angle or 0.0
-        for name, own in moved.items()
-    }
-    return [replace(c, zero=angles.get(c.record, 0.0)) for c in recorded]
+    angles = {}
+    for name, own in moved.items():
+        refined = between({n: z[reference][n] for n in own if n in z[reference]}, z[name]).angle
+        angles[name] = plant.zeros[name].angle if refined is None else refined  # no law has a line of order 1
+    return [replace(c, zero=angles.get(c.record) or 0.0) for c in recorded]
