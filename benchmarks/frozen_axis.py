@@ -32,7 +32,7 @@ def main(trials: int, threads: int, out: Path | None, rows_file: Path | None, in
 
 def trial(t: strata_axis.Trial, threads: int) -> dict[str, Any]:
     """Look for what a trial hides, and lay what is found beside it."""
-    told = {"case": t.case, "plant": t.plant, "effects": list(t.effects), "hidden": t.truth}
+    told = {"case": t.case, "plant": t.plant, "effects": list(t.effects), "near": list(t.near), "hidden": t.truth}
     model = LinearAxis if t.plant_file.get("motion") == "linear" else RotaryAxis
     begun = time.process_time()
     try:

@@ -69,9 +69,9 @@ def truth(row: Row) -> set[str]:
 
 
 def _answers(rows: Iterable[Row]) -> list[tuple[float, bool]]:
-    """Stated probability of each named effect or set, and whether a true one is in it."""
+    """Stated probability of each named effect or set, and whether a true one, or what acts like it, is in it."""
     return [
-        (min(1.0, p * len(named)), bool(set(named) & truth(row)))
+        (min(1.0, p * len(named)), bool(set(named) & (truth(row) | set(row.get("near", ())))))
         for row in rows
         for named, p in zip(row["named"], row["confidence"], strict=True)
     ]

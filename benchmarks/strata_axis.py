@@ -26,7 +26,8 @@ NEAR = {
     "cushion": ("spring_load",), "gap": ("gear_compliance",), "maxwell_slip": ("friction_memory",),
     "heat": ("friction_drift",), "clutch": ("gear_compliance",), "current_lag": ("speed_delay", "position_delay"),
     "one_way_fan": ("quadratic_drag", "viscous_by_direction"), "load_step": ("constant_load",),
-    "one_sided_driver": ("drive_unequal", "drive_gain", "magnet_flux"),
+    # an axis that is driven by less torque per current is as one that is heavier and has more friction
+    "one_sided_driver": ("drive_unequal", "drive_gain", "magnet_flux", "inertia"),
 }  # fmt: skip
 # Torque, inertia beyond that, inductance and resistance over those of tests/support/axis_bench.py.
 PLANTS = {"small": (1.0, 1.0, 1.0, 1.0), "strong": (5.0, 2.5, 3.0, 1.5), "tiny": (0.25, 0.5, 0.4, 2.0)}

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import blocks_left_out as left_out
 from .plant import Array, Free, Plant, Point
 
 HUBER = 4.0  # residuals beyond this many scales count linearly: a window that diverges must not decide a fit
@@ -15,6 +17,7 @@ WILD = 20.0  # and beyond this many they all count the same when models are comp
 RUNAWAY = 1e4
 LONGEST = 30.0  # scales of a parameter in one step
 N_DAMPINGS = 6  # tried before a fit gives up
+LEAST = 1e-6  # of the largest eigenvalue, below which a direction rests on one block alone
 CONVERGED = 0.02  # gain in log-likelihood of a step below which a fit has converged
 
 
@@ -30,7 +33,7 @@ class Fit:
     residuals : list of arrays
         Whitened residuals by block.
     covariance : array, shape (n_free, n_free)
-        Of the free parameters; scaled by the residual where that is larger than noise.
+        Of the free parameters; scaled by the residual where that is larger than noise, and as wide as blocks disagree.
     blocks : tuple of int
     scale : float
         Robust scale of the residual, at least 1 (= noise).
@@ -146,14 +149,18 @@ class _Objective:
         Js, own = J * self.scales, self.prior_slopes * self.scales
         return Js.T @ (weight[:, None] * Js) + own.T @ own, Js.T @ (weight * r) + own.T @ self.prior(x)
 
-    def covariance(self, J: Array, scale: float) -> Array:
-        """Of the free parameters, where residuals have this scale."""
+    def covariance(self, J: Array, residuals: Sequence[Array], scale: float) -> Array:
+        """Of the free parameters, where residuals have this scale; each as wide as blocks disagree on it, at least."""
         Js = J * self.scales
         own = self.prior_slopes * self.scales * scale  # the prior is not loosened by a poor residual
         A = Js.T @ Js + own.T @ own
-        return np.asarray(
-            np.linalg.pinv(A, rcond=1e-12, hermitian=True) * np.outer(self.scales, self.scales) * scale**2
-        )
+        found = np.linalg.pinv(A, rcond=1e-12, hermitian=True) * scale**2
+        ends = np.cumsum([0, *(r.size for r in residuals)])
+        r = np.clip(_flat(residuals), -HUBER * scale, HUBER * scale)
+        parts = ((Js[a:b], r[a:b]) for a, b in pairwise(ends.tolist()))
+        shown = left_out.covariance(A, ((P.T @ P, P.T @ own_r) for P, own_r in parts), LEAST)
+        wider = np.sqrt(np.maximum(np.diag(shown) / np.maximum(np.diag(found), 1e-300), 1.0))
+        return np.asarray(found * np.outer(wider * self.scales, wider * self.scales))
 
 
 def fit(
@@ -198,7 +205,7 @@ def fit(
             break
         J = of.slopes(x, r)
     scale = scale_of(residuals)
-    return Fit(of.free, of.at(x), residuals, of.covariance(J, scale), of.blocks, scale)
+    return Fit(of.free, of.at(x), residuals, of.covariance(J, residuals, scale), of.blocks, scale)
 
 
 def _step(A: Array, g: Array, damping: float, moving: NDArray[np.bool_]) -> Array:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ema.core.records import Array
+from ema.discrepancy import blocks_left_out
 
 from .law import BY_RECORD, Acting, Law
 from .rows import Rows
@@ -100,14 +101,9 @@ class Regression:
         """Of the coefficients, by leaving out one block after the other: rows overlap, and no law is quite right."""
         size = np.maximum(np.linalg.norm(self.design, axis=0), 1e-300)
         A, n = self.design / size, self.rows.n_blocks
-        gram, scores = A.T @ A, np.zeros((n, A.shape[1]))
-        np.add.at(scores, self.rows.block, A * self.left[:, None])
-        moved = np.array([
-            _of_normal(gram - A[own].T @ A[own], scores[b], LEAST)
-            for b, own in enumerate(self.rows.block == b for b in range(n))
-        ])  # fmt: skip
-        moved = (moved - moved.mean(axis=0)) / size
-        return np.asarray(moved.T @ moved * (n - 1) / max(n, 1))
+        parts = [(A[own], self.left[own]) for own in (self.rows.block == b for b in range(n))]
+        moved = blocks_left_out.covariance(A.T @ A, ((P.T @ P, P.T @ r) for P, r in parts), LEAST)
+        return np.asarray(moved / np.outer(size, size))
 
 
 def fitted(rows: Rows, plain: Plain, laws: Sequence[Law], *, apart: bool = False) -> Regression:
