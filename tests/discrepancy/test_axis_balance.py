@@ -75,12 +75,21 @@ def test_what_loses_one_polarity_is_a_drive_and_no_friction(axis_bench, hidden_a
     assert term["confidence"] > 0.9
 
 
-@pytest.mark.parametrize("hidden", ["resolver_error", "inverter_drop", "saturation", "speed_delay"])
+@pytest.mark.parametrize("hidden", ["resolver_error", "inverter_drop", "speed_delay"])
 def test_a_flaw_of_sensor_or_converter_is_no_law_of_the_balance(axis_bench, hidden_axis, hidden):
     bench, plant_file, motions = hidden_axis.drawn(1)
     bench, _, rng = hidden_axis.bench_with([hidden], 1, bench)
     record = axis_bench.record(bench, rng, motions=motions)
     assert told(balance(AxisPlant(RotaryAxis.model_validate(plant_file), [record])), linear=False)["terms"] == []
+
+
+def test_a_motor_that_saturates_is_friction_by_the_square_of_its_torque_or_saturation(axis_bench, hidden_axis):
+    """No balance of one axis knows whether a torque is lost in the motor or rubbed away behind it."""
+    bench, plant_file, motions = hidden_axis.drawn(1)
+    bench, _, rng = hidden_axis.bench_with(["saturation"], 1, bench)
+    record = axis_bench.record(bench, rng, motions=motions)
+    terms = told(balance(AxisPlant(RotaryAxis.model_validate(plant_file), [record])), linear=False)["terms"]
+    assert all("saturation" in t["indistinguishable_from"] for t in terms)
 
 
 def test_a_constant_force_comes_with_what_no_balance_tells_from_it(positioner):

@@ -41,6 +41,7 @@ def test_what_a_saturating_motor_does_not_give_is_no_friction_by_load(geared):
     point = {"F_d": geared.Axis().F, "saturation.emf": 0.2}
     beside, added = together(plant, [found("saturation")], "partly explained", point)
     assert named(beside) == {"saturation"}
+    assert balance_beside(plant, point).terms == ()
     assert added is None
 
 

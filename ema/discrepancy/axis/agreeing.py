@@ -59,7 +59,8 @@ def together(
 def _missing(b: Balance, found: Sequence[shared.FoundEffect]) -> list[Term]:
     """Likely laws that the library has as effects, and that nothing found stands for."""
     told = {name for e in found for name in (e.name, *e.indistinguishable_from)}
-    return [term for term in b.terms if _named(b, term) not in ("", *told) and _of_set(b, term) >= LIKELY]
+    new = [term for term in b.terms if (name := _named(b, term)) and not {name, *term.law.also} & told]
+    return [term for term in new if _of_set(b, term) >= LIKELY]
 
 
 def _named(b: Balance, term: Term) -> str:

@@ -134,7 +134,8 @@ def _by_load(u: Units) -> Iterator[Law]:
             {"per_torque": f"1/({u.torque})"},
             one("per_torque"),
             f"friction grows with the square of {what}, by {{per_torque:.3g}} of it per {u.torque}",
-            "the same motion with different loads",
+            "the same motion with different loads, or voltage beside current",
+            also=("saturation",) if side == "motor" else (),  # what such a motor does not give grows alike
             is_friction=True,
             needs_acting=True,
         )
