@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ema.bundle import Bundle
 from ema.core.names import FAULTS
 from ema.core.status import Reason, Status
-from ema.identification import Estimate, NuisanceEstimate
+from ema.identification import Estimate, NuisanceEstimate, Unbounded
 from ema.monitor import Job
 
 from .wire import WireError, WrongAnswer, fingerprint, plain, to_line
@@ -43,6 +43,14 @@ class _Beside(_Strict):
     interval95: list[list[float]]
 
 
+class _Unbounded(_Strict):
+    """An Unbounded."""
+
+    k: list[float]
+    own: list[list[float]]
+    shared: list[list[float]]
+
+
 class _Answer(_Strict):
     """An Estimate, and what it is the answer to."""
 
@@ -62,6 +70,7 @@ class _Answer(_Strict):
     reasons: Whole
     unseparable: list[list[float]]
     nuisance: _Beside | None
+    unbounded: _Unbounded | None
 
 
 class _Refusal(_Strict):
@@ -78,7 +87,8 @@ def pack_answer(answer: Estimate, job: Job, bundle: str) -> bytes:
     content["unseparable"] = [plain(direction) for direction in answer.unseparable]
     whose = {"bundle": bundle, "actuator": job.actuator, "cycle": job.cycle, "t_ns": job.t_ns, "method": answer.method}
     codes = {"dof": int(answer.dof), "status": int(answer.status), "reasons": int(answer.reasons)}
-    return to_line(whose | content | codes | {"nuisance": _pack_beside(answer.nuisance)})
+    free = answer.unbounded and {name: plain(values) for name, values in answer.unbounded._asdict().items()}
+    return to_line(whose | content | codes | {"nuisance": _pack_beside(answer.nuisance), "unbounded": free})
 
 
 def pack_error(error: Exception) -> bytes:
@@ -130,7 +140,12 @@ def _estimate(said: _Answer) -> Estimate:
         *(Status(said.status), Reason(said.reasons)),
         unseparable=tuple(np.array(direction, float) for direction in said.unseparable),
         nuisance=_beside(said.nuisance),
+        unbounded=_free(said.unbounded),
     )
+
+
+def _free(said: _Unbounded | None) -> Unbounded | None:
+    return None if said is None else Unbounded(*(np.array(x, float) for x in (said.k, said.own, said.shared)))
 
 
 def _beside(said: _Beside | None) -> NuisanceEstimate | None:
@@ -158,7 +173,7 @@ def _impossible(e: Estimate, job: Job, bundle: Bundle) -> str:
             return f"{name} has the shape {getattr(e, name).shape}, must be {shape}"
     numbers = np.concatenate([e.k, e.sd, e.covariance.ravel(), [e.chi2, e.p_value], e.residual[valid]])
     if np.isnan(numbers).any():
-        given = np.isnan(numbers).all() and e.nuisance is None and e.status > Status.DEGRADED
+        given = np.isnan(numbers).all() and e.nuisance is e.unbounded is None and e.status > Status.DEGRADED
         return "" if given else "some of its numbers are missing"
     if e.k.min() < -_ROUNDING or e.k.max() > 1 + _ROUNDING:
         return f"k = {e.k.tolist()} is not within 0…1"
@@ -166,7 +181,18 @@ def _impossible(e: Estimate, job: Job, bundle: Bundle) -> str:
         return "its standard deviations or covariance are none"
     if any(d.shape != (n,) or not np.isclose(np.linalg.norm(d), 1) for d in e.unseparable):
         return "what it cannot tell apart is no direction of k"
-    return _impossible_beside(e.nuisance, bundle)
+    return _impossible_unbounded(e) or _impossible_beside(e.nuisance, bundle)
+
+
+def _impossible_unbounded(e: Estimate) -> str:
+    free, n = e.unbounded, len(FAULTS)
+    if free is None:
+        return "its estimate before the bounds is missing"
+    if [part.shape for part in free] != [(n,), (n, n), (n, n)]:
+        return "its estimate before the bounds has another shape"
+    if any(np.linalg.eigvalsh(total).min() <= 0 for total in (free.own, free.own + free.shared)):
+        return "the covariance of its estimate before the bounds is none"
+    return ""
 
 
 def _impossible_beside(beside: NuisanceEstimate | None, bundle: Bundle) -> str:

@@ -15,11 +15,12 @@ from ema.core.names import METHODS
 from .estimate import Estimate
 from .measurement import Measurement
 from .nuisance import NuisanceEstimate
+from .unbounded import Unbounded
 
 if TYPE_CHECKING:
     from ema.bundle import Bundle
 
-__all__ = ["METHODS", "Estimate", "Identifier", "Measurement", "NuisanceEstimate", "identifier"]
+__all__ = ["METHODS", "Estimate", "Identifier", "Measurement", "NuisanceEstimate", "Unbounded", "identifier"]
 
 
 class Identifier(Protocol):

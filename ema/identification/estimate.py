@@ -10,6 +10,7 @@ from ema.core.status import Reason, Status
 
 from .nuisance import Edges, NuisanceEstimate
 from .truncated import Marginals
+from .unbounded import Unbounded
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class Estimate:
         Directions of k that this cycle's data leave open (unit vectors).
     nuisance : NuisanceEstimate or None
         What was estimated beside the faults, if the bundle carries nuisance parameters.
+    unbounded : Unbounded or None
+        The estimate before the bounds, if there is one.
     edges : Edges or None
         How far faults may go while nuisance parameters make up for them; intervals reach as far.
     """
@@ -52,6 +55,7 @@ class Estimate:
     unseparable: tuple[np.ndarray, ...] = ()
     nuisance: NuisanceEstimate | None = None
     edges: Edges | None = None
+    unbounded: Unbounded | None = None
 
     def interval(self, level: float) -> np.ndarray:
         """Shortest intervals that hold each fault with probability `level`, shape (6, 2); NaN without an estimate."""

@@ -14,9 +14,9 @@ from .measurement import Measurement
 from .noise import NoiseModel
 from .nuisance import N_FAULTS, Edges, Nuisance, estimated, rivals
 from .truncated import Marginals, in_unit_box
+from .unbounded import AT_BOUND, Unbounded
 from .weighted import Solution, Whitener, bounded_least_squares, p_value
 
-AT_BOUND = 1e-9
 DOUBT_LEVEL = 1e-3  # share of sound cycles whose test of fit may fail
 PARTS = (slice(None, N_FAULTS), slice(N_FAULTS, None))
 OPEN = 0.15  # a direction of k with a larger standard deviation is called unseparable [share of a complete failure]
@@ -111,8 +111,19 @@ def concluded(
         status = Status.INVALID
     return Estimate(
         *(method, answer, sd, covariance, chi2, dof, p, full, status, reasons), marginals, open_directions,
-        nuisance_estimate, edges,
+        nuisance_estimate, edges, _unbounded(measurement, noise, problem, solution, white),
     )  # fmt: skip
+
+
+def _unbounded(
+    measurement: Measurement, noise: NoiseModel, problem: Problem, solution: Solution, white: Whitener
+) -> Unbounded:
+    """The answer before the bounds; all of its covariance that is not of this cycle alone is shared by others."""
+    v = np.ix_(measurement.valid, measurement.valid)
+    w = white(white(problem.A @ solution.covariance[:, :N_FAULTS]), transposed=True)  # δk = wᵀ δi
+    own = w.T @ noise.of_a_cycle(measurement.start, problem.x + solution.x)[v] @ w
+    k = (problem.x + solution.free)[:N_FAULTS]
+    return Unbounded(k, own, solution.covariance[:N_FAULTS, :N_FAULTS] - own)
 
 
 def unseparable(covariance: np.ndarray) -> tuple[np.ndarray, ...]:

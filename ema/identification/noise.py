@@ -66,9 +66,13 @@ class NoiseModel:
 
     def covariance(self, start: np.ndarray | None, k: np.ndarray) -> np.ndarray:
         """Σ for a cycle that began at `start` with faults near `k`."""
+        return self.of_a_cycle(start, k) + self.of_model(k)
+
+    def of_a_cycle(self, start: np.ndarray | None, k: np.ndarray) -> np.ndarray:
+        """The part of Σ that is drawn anew in each cycle: all but the model's error. [A²]"""
         d2 = D2_UNKNOWN if start is None else min(float(np.sum((start / self.start_scale) ** 2)), D2_MAX)
         far_off = d2 * (self.start + float(k @ k) * self.start_k)
-        return self.switching + self.of_model(k) + far_off + self.of_measured_start(start, k)
+        return self.switching + far_off + self.of_measured_start(start, k)
 
     def of_measured_start(self, start: np.ndarray | None, k: np.ndarray) -> np.ndarray:
         """What an inexact start adds, shape (n_omega, n_omega); nothing where it is unknown. [A²]"""

@@ -22,9 +22,9 @@ class Whitener:
         if failed:
             raise np.linalg.LinAlgError("a noise covariance is not positive definite")
 
-    def __call__(self, x: np.ndarray) -> np.ndarray:
-        """L⁻¹ x for x of shape (n,) or (n, m)."""
-        return np.asarray(dtrtrs(self.L, x, lower=1)[0])
+    def __call__(self, x: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """L⁻¹ x, or L⁻ᵀ x, for x of shape (n,) or (n, m)."""
+        return np.asarray(dtrtrs(self.L, x, lower=1, trans=int(transposed))[0])
 
 
 class Solution(NamedTuple):

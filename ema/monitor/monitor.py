@@ -137,7 +137,7 @@ class Monitor:
     def _concluded(self, job: Job, estimate: Estimate) -> Iterator[Output]:
         doubt = self._channels[job.actuator].doubts[job.method]
         usable = not (job.reasons | estimate.reasons) & _INVALIDATING
-        changed = usable and doubt.update(job.cycle, estimate.p_value)
+        changed = usable and doubt.update(job.cycle, estimate.p_value, estimate.unbounded)
         reasons = self._reasons(job, estimate)
         status = max(estimate.status, Status.DEGRADED if reasons & _DEGRADING else Status.VALID)
         status = status if usable else Status.INVALID
@@ -169,7 +169,7 @@ class Monitor:
         """
         channel = self._channels[job.actuator]
         reasons = estimate.reasons | job.reasons
-        if channel.doubts[job.method].doubted:
+        if channel.doubts[job.method].doubted or channel.doubts[job.method].impossible:
             reasons |= Reason.MODEL_IN_DOUBT
         if job.method == FIRST and ARBITER in channel.doubts:
             if channel.doubts[ARBITER].doubted:
@@ -216,6 +216,8 @@ def _judgement(job: Job, doubt: ModelDoubt, arbitrated: bool) -> Event:
     if doubt.doubted:
         cycles = ", ".join(map(str, doubt.cycles))
         text = f"{job.method}: the residuals of cycles {cycles} are larger than the noise explains"
+        if doubt.fits:
+            text = f"{job.method}: cycles {cycles} read as less than no fault, or more than a complete one"
         if arbitrated:
             return Event(job.t_ns, Level.INFO, "beyond_linear", f"{text}; {ARBITER} is asked", job.actuator)
         text += f"; for the cause: ema discrepancy LOG --plant FILE --cycles {','.join(map(str, doubt.cycles))}"

@@ -67,6 +67,12 @@ WRONG = {
         {"nuisance": {"names": ["x"], "units": [""], "value": [1.0], "sd": [1.0], "covariance": [], "interval95": []}},
         "not the bundle's",
     ),
+    "nothing before the bounds": ({"unbounded": None}, "before the bounds is missing"),
+    "before the bounds another shape": ({"unbounded": {"k": [0.0], "own": [], "shared": []}}, "another shape"),
+    "before the bounds no covariance": (
+        {"unbounded": {"k": [0.0] * 6, "own": [[0.0] * 6] * 6, "shared": [[0.0] * 6] * 6}},
+        "covariance of its estimate before the bounds is none",
+    ),
     "more than asked": ({"alarm": 1}, "alarm"),
 }
 

@@ -15,6 +15,12 @@ def flown(hidden, bundle, **flaws):
     return watched(bundle, hidden.cycles(hidden.Flaws(**flaws), N, 17, motions=(hidden.chirp(),)))
 
 
+def is_wrong(estimate, k, level=0.999):
+    """Whether a fault is outside its interval: of a backlash of 0.1 so coarse a bundle puts a tenth on other faults."""
+    low, high = estimate.interval(level).T
+    return bool((k < low).any() or (k > high).any())
+
+
 @pytest.mark.parametrize("flaws", [{"cogging": 0.01}, {"viscous": 6e-5}], ids=["cogging", "viscous drag"])
 def test_an_unmodelled_effect_puts_the_model_in_doubt(hidden, coarse_bundle, flaws):
     """From the third cycle that speaks against it; the event says which cycles, and what to do with them."""
@@ -29,10 +35,21 @@ def test_an_unmodelled_effect_puts_the_model_in_doubt(hidden, coarse_bundle, fla
 
 @pytest.mark.parametrize("faults", [{}, {"k1": 0.05, "k4": 0.04}, {"k1": 0.3}, {"k2": 0.1}], ids=str)
 def test_neither_a_sound_actuator_nor_a_faulty_one_is_doubted(hidden, coarse_bundle, faults):
-    seen = flown(hidden, coarse_bundle, **faults)
-    assert seen.doubted.sum() <= 1
+    seen, k = flown(hidden, coarse_bundle, **faults), [faults.get(f"k{j}", 0.0) for j in range(1, 7)]
+    assert sum(doubted and not is_wrong(e, k) for doubted, e in zip(seen.doubted, seen.estimates, strict=True)) <= 1
     assert not any(e.code == "model_in_doubt" for e in seen.events)
-    assert not seen.alarms([faults.get(f"k{j}", 0.0) for j in range(1, 7)])
+    assert not seen.alarms(k)
+
+
+@pytest.mark.parametrize("flaws", [{"flux": 0.005}, {"inertia": -0.006}], ids=str)
+def test_an_actuator_livelier_than_its_bundle_is_doubted_though_each_residual_fits(hidden, coarse_bundle, flaws):
+    """It reads as shorts of less than none; the bounds put what they would explain on k6, which is 0.1."""
+    seen = flown(hidden, coarse_bundle, k6=0.1, **flaws)
+    k6 = [(float(e.k[5]), e.interval(0.95)[5, 1], e.status) for e in seen.estimates]
+    assert all(high < 0.1 for _, high, _ in k6)  # wrong, by what each cycle tells alone
+    assert sum(e.p_value > 1e-3 for e in seen.estimates) >= 2
+    assert all(status is not Status.VALID for _, _, status in k6[2:])
+    assert any(e.code == "model_in_doubt" for e in seen.events)
 
 
 def test_a_weaker_magnet_reads_as_three_shorts_that_are_marked_unseparable(hidden, coarse_bundle):

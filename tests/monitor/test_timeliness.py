@@ -55,6 +55,7 @@ def test_one_of_an_older_cycle_than_was_sent_is_not_sent(timeliness):
     assert verdict.event.code == Untimely.OUTDATED
     assert estimate.reasons & Reason.LATE
     assert judged(timeliness, 9, 6.0, 6.1)[0].to_bus
+    assert not judged(timeliness, 8, 5.5, 6.2)[0].to_bus  # newer than the first, older than the newest
 
 
 def test_other_actuators_and_methods_have_their_own_order(timeliness):
