@@ -1,0 +1,61 @@
+"""The score has the last word: where the search's answer is unlikely, the likeliest set that was fitted is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from ema.core.records import Cycle, Record
+from ema.discrepancy.actuator import examine as whole
+from ema.discrepancy.actuator.candidates import candidates
+from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.fit import K_FREE
+from ema.discrepancy.actuator.paths import Path
+
+DRAG = 7e-5
+STARTS = {"viscous_drag": {"viscous_drag.coefficient": DRAG}, "inertia": {"inertia.change": 0.1}}
+# What the search does to its answer before it is weighed, and where among its arguments that answer stands.
+LEAVE_AS_IT_IS = {"at_the_minimum": 1, "with_fewer_faults": 2, "simpler": 2, "without_superfluous": 1,
+                  "without_doubtful": 1, "with_temperature_only": 1, "with_zero": 1}  # fmt: skip
+
+
+def led_to(name):
+    """A search that fits both causes and ends at `name`."""
+
+    def search_is_led(search, paths):
+        data, fitted = search.plant.data, {}
+        for c in candidates(search.plant.plant, data, []):
+            if c.effect in STARTS:
+                fitted[c.effect] = search.model((c,), (*K_FREE, *c.frees), STARTS[c.effect], None, 2)
+        after = fitted[name]
+        path = Path.of(search, paths[0].before)
+        return replace(path, tried=list(search.tried), after=after, verdict=search.verdict(after), alike=[()])
+
+    return search_is_led
+
+
+@pytest.mark.slow
+def test_the_likeliest_set_takes_the_place_of_an_unlikely_answer(hidden, shipped_plant, monkeypatch):
+    """Led to a heavier rotor where there is drag, with real noise, fits and contest on two short cycles."""
+    alone = lambda search, start: [Path.of(search, search.model((), K_FREE, start, None, 2))]  # noqa: E731
+    monkeypatch.setattr(whole, "faults_only", alone)
+    monkeypatch.setattr(whole, "growing", lambda search, before: None)
+    monkeypatch.setattr(whole, "shortest", led_to("inertia"))
+    for step, at in LEAVE_AS_IT_IS.items():
+        monkeypatch.setattr(whole, step, lambda *of, at=at: (of[at], of[at + 1]))
+    cycles = hidden.cycles(hidden.Flaws(viscous=DRAG), 2, 1, (hidden.chirp(),))
+    record = Record(tuple(Cycle(number, channels) for number, channels in enumerate(cycles)))
+    findings = whole.examine(shipped_plant, measured(shipped_plant, [record])).findings
+    (effect,) = findings.effects
+    assert effect.name == "viscous_drag"
+    assert effect.confidence > 0.9
+    found = effect.parameters["coefficient"]
+    assert found.low < DRAG < found.high
+    assert effect.z > 5.0
+    assert findings.verdict == "explained"
+    lost = next(row for row in findings.rejected if row["name"] == "inertia")
+    assert lost["nats"] > 5.0
+    assert lost["nats_of"] == "evidence"
+    assert "nats behind viscous_drag by the evidence of the record" in lost["why"]
+    assert [low for low, _ in findings.gain.k_interval] == pytest.approx([0.0] * 6, abs=5e-3)
