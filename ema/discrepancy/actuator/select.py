@@ -8,6 +8,7 @@ from ema.core.names import FAULTS
 
 from .fit import fit
 from .resembling import looking_like
+from .ridge import walked
 from .screening import AT_LEAST, Screened, simulated, start_with
 from .search import FAR, Model, Search
 
@@ -94,7 +95,8 @@ def _refined(search: Search, model: Model, s: Screened) -> Model:
         simpler, simpler_cost = search.better([alone.point], model)
         if simpler_cost < NO_WORSE * cost:
             start = simpler
-    return search.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3)
+    made = search.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3)
+    return walked(search, model, made, s.candidate) if model.shows_faults_of(s.candidate) else made
 
 
 def _close(refined: dict[str, Model], model: Model) -> list[tuple[str, Model]]:

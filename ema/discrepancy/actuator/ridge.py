@@ -1,0 +1,58 @@
+"""One effect for any share of what several faults have in common.
+
+A weaker magnet and shorts of all phases are nearly the same torque at the same current. From all of it by faults to all
+by the effect leads a ridge, along which the record changes by little and not evenly: either end may be a minimum of its
+own, which no step by slopes leaves. So the ridge is walked, and a fit begins where it is lowest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .candidates import Candidate
+from .fit import fit
+from .plant import Point
+from .screening import start_with
+from .search import Model, Search
+
+N_SHARES = 8  # of the ridge
+
+
+def walked(search: Search, model: Model, made: Model, effect: Candidate) -> Model:
+    """`made`, which is `model` with an effect that several of its faults can stand for, or one that leaves less.
+
+    The other one is fitted from the lowest point of the ridge, if that is lower than where `made` ended.
+    """
+    points = _ridge(search, model, effect)
+    costs = search.costs([made.fit.point, *points], search.train, typical=False)
+    lowest = int(np.argmin(costs))
+    if lowest == 0:
+        return made
+    other = search.model(made.effects, made.fit.free, points[lowest - 1], None, 3)
+    return min(made, other, key=lambda m: m.heldout)
+
+
+def _ridge(search: Search, model: Model, effect: Candidate) -> list[Point]:
+    """Points at equal distances, from an eighth of the faults' common part by the effect to all of it.
+
+    The effect is fitted at the middle and at the end; between them it goes along a parabola.
+    """
+    k, neutral = model.fit.point, {f.name: search.plant.neutral(f.name) for f in effect.frees}
+    common = min(k[name] for name in effect.faults)
+
+    def faults(share: float) -> Point:
+        return {name: k[name] - share * common for name in effect.faults}
+
+    middle, end = (
+        fit(search.plant, search.noise, effect.frees, start_with(search, model, effect, faults(s)), search.train).point
+        for s in (0.5, 1.0)
+    )
+
+    def at(s: float) -> Point:
+        size = {
+            name: x + s * (4.0 * middle[name] - 3.0 * x - end[name]) + 2.0 * s**2 * (x + end[name] - 2.0 * middle[name])
+            for name, x in neutral.items()
+        }
+        return {**end, **faults(s), **size}
+
+    return [at((1.0 + j) / N_SHARES) for j in range(N_SHARES)]

@@ -1,0 +1,40 @@
+"""A weaker magnet beside unequal shorts, recorded by a simulator of another hand: two minima, and the way between."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.foreign import record, truths
+from ema.core.names import FAULTS
+from ema.core.records import Record
+from ema.discrepancy.actuator.candidates import candidates
+from ema.discrepancy.actuator.conditions import as_recorded
+from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.examine import split
+from ema.discrepancy.actuator.fit import K_FREE
+from ema.discrepancy.actuator.noise import Noise
+from ema.discrepancy.actuator.plant import EmaPlant
+from ema.discrepancy.actuator.ridge import walked
+from ema.discrepancy.actuator.screening import probed
+from ema.discrepancy.actuator.search import Search
+
+ALONE = dict(zip(FAULTS, (0.0643, 0.1001, 0.1367, 0.1221, 0.0953, 0.0117), strict=True))  # where faults alone end
+
+
+@pytest.mark.slow
+def test_a_magnet_is_found_between_none_of_the_shorts_and_all_of_them(shipped_plant):
+    """Slopes had led from either end of the ridge to nothing: shorts stayed 0.037 too large, with no magnet named."""
+    truth = truths()["flux_and_faults"]
+    data = measured(shipped_plant, [Record(record("flux_and_faults").cycles[:4])])
+    plant = EmaPlant(as_recorded(shipped_plant, data.signals)[0], data)
+    search = Search(plant, Noise(plant, ALONE), *split(data))
+    (magnet,) = probed(search, [next(c for c in candidates(plant.plant, data, []) if c.effect == "magnet_flux")])
+    model = search.model((), K_FREE, ALONE, None, 1)
+    stuck = search.model((magnet,), (*K_FREE, *magnet.frees), model.fit.point, None, 3)
+    shorts = [name for name in FAULTS if name in magnet.faults]
+    assert min(stuck.fit.point[name] - truth["k"][FAULTS.index(name)] for name in shorts) > 0.03
+    found = walked(search, model, stuck, magnet)
+    assert found.heldout < stuck.heldout
+    assert found.fit.point["magnet_flux.change"] == pytest.approx(truth["hidden"]["magnet_flux.change"], abs=0.004)
+    for name, true in zip(FAULTS, truth["k"], strict=True):
+        assert found.fit.point[name] == pytest.approx(true, abs=0.004)
