@@ -98,6 +98,16 @@ def test_friction_that_grows_with_the_square_of_the_motor_torque_is_named_where_
     assert law["parameters"]["per_torque"]["value"] == pytest.approx(2.5, rel=0.05)
 
 
+def test_a_law_that_takes_all_that_is_more_than_noise_is_needed_though_it_is_small_beside_the_drive(geared):
+    """Less than a hundredth of the drive's torque; without it 16 times what noise makes is left, with it noise."""
+    b = balance(plant_of(geared, F=0.0365, by_square=1.5, seconds=8.0))
+    (term,) = b.terms
+    assert term.law.family == "friction by square of load"
+    assert term.power < 3e-4 * b.drive
+    assert b.left_base > 10.0 * b.noise
+    assert b.left < 1.2 * b.noise
+
+
 PLANETARY = {"gear": 6.0, "gear_kind": "planetary", "teeth": (17, 85)}
 HARMONIC = {"gear": 100.0, "gear_kind": "harmonic"}
 
