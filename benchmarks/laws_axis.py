@@ -18,7 +18,6 @@ import numpy as np
 
 from benchmarks import resumed
 from ema.core.version import version
-from ema.discrepancy.axis.balance.telling import told
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
@@ -66,13 +65,16 @@ def look(seed: int, number: int) -> dict[str, Any]:
     plant = AxisPlant(RotaryAxis.model_validate(geared.plant(axis, **GEAR)), [record], n_threads=1)
     plant.between = "held"
     assert plant.balance is not None
-    terms = told(plant.balance, linear=False)["terms"]
-    said = [[t["name"], t["confidence"], t["indistinguishable_from"]] for t in terms]
+    b = plant.balance
+    said = [[t.law.name, round(b.of_set(t), 4), sorted({*t.alike, *t.law.also})] for t in b.terms]
     return {"code": version(), "seed": seed, "number": number, "hidden": name, "said": said}
 
 
 def rated(row: dict[str, Any]) -> str:
-    """What an answer counts as: the truth alone, in a set of two, with less than `SURE`, beside another, or not."""
+    """What an answer counts as: the truth alone, in a set of two, with less than `SURE`, beside another, or not.
+
+    How sure is said of the law and those it is not told from together.
+    """
     sets = [({name, *others}, sure) for name, sure, others in row["said"]]
     own = [(s, sure) for s, sure in sets if row["hidden"] in s]
     wrong = any(row["hidden"] not in s and sure >= SURE for s, sure in sets)

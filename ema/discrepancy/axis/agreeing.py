@@ -60,17 +60,12 @@ def _missing(b: Balance, found: Sequence[shared.FoundEffect]) -> list[Term]:
     """Likely laws that the library has as effects, and that nothing found stands for."""
     told = {name for e in found for name in (e.name, *e.indistinguishable_from)}
     new = [term for term in b.terms if (name := _named(b, term)) and not {name, *term.law.also} & told]
-    return [term for term in new if _of_set(b, term) >= LIKELY]
+    return [term for term in new if b.of_set(term) >= LIKELY]
 
 
 def _named(b: Balance, term: Term) -> str:
     """The effect that acts like a law; empty where the library has none."""
     return next((name for name, values in effects(b, term).items() if values), "")
-
-
-def _of_set(b: Balance, term: Term) -> float:
-    """Confidence in a law or one of those that do as well."""
-    return min(1.0, b.confidence(term) * (1.0 + sum(term.alike.values()) / max(term.wins, 1e-300)))
 
 
 def _is_same(e: shared.FoundEffect, values: dict[str, float]) -> bool:
@@ -93,7 +88,7 @@ def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.Found
         low, high = np.percentile(spread, INTERVAL)
         parameters[key] = shared.Quantity(value, float(low), float(high), units[key])
     others = tuple(sorted({*term.alike, *term.law.also}))
-    confidence = round(_of_set(b, term) / (1 + len(others)), 4)  # those in a set share what is sure of it
+    confidence = round(b.of_set(term) / (1 + len(others)), 4)  # those in a set share what is sure of it
     return shared.FoundEffect(
         name, confidence, others, parameters, said(effect.said(values)) + ALONE, effect.separated_by
     )  # fmt: skip

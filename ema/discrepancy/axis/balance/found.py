@@ -67,6 +67,10 @@ class Balance:
         sure = term.wins * term.power / (term.power + rest) if term.power > 0.0 else 0.0
         return sure * against(term.law, self.agreements)
 
+    def of_set(self, term: Term) -> float:
+        """Confidence in a law or one of those that do as well."""
+        return min(1.0, self.confidence(term) * (1.0 + sum(term.alike.values()) / max(term.wins, 1e-300)))
+
     def explained(self, left: float) -> float:
         """Share of the drive's torque, as a coefficient of determination."""
         return 1.0 - left / self.drive
