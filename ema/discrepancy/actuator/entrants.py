@@ -17,7 +17,7 @@ from .problem import ActuatorProblem, as_cause
 from .search import Model, Search
 
 RUNS = 1_000  # seeds of a motion's noise, at most
-MOST = 6  # sets of effects that are weighed
+OTHERS = 4  # sets of effects that are weighed beside faults alone, the answer and what is in it
 RECORDS = 16  # simulated records of each
 WORTH_A_WORD = 0.01  # a fault
 
@@ -26,7 +26,7 @@ def weighed(search: Search, before: Model, after: Model) -> tuple[Outcome, list[
     """Probabilities of the sets of effects that were tried, and the best model of each, likeliest first."""
     search.say("probabilities of what was tried")
     problem = ActuatorProblem(search.plant)
-    models = _standing(search, before, after)
+    models = _standing(search, [before, after, *_within(search, after)])
     found = [_entrant(search, m) for m in models]
     outcome = Contest(problem, found, _whitening(problem, search.noise), RECORDS, search.say).run(found)
     first = {e.names: m for m, e in reversed([*zip(models, found, strict=True)])}
@@ -51,14 +51,33 @@ def as_told(outcome: Outcome) -> list[dict[str, Any]]:
     ]
 
 
-def _standing(search: Search, before: Model, after: Model) -> list[Model]:
-    """Faults alone, the answer, and the models of other sets of effects, those that leave least first.
+def _within(search: Search, answer: Model) -> list[Model]:
+    """The sets of effects that are in the answer's, fitted anew from it.
+
+    What was chosen first was chosen without what came later, and what lies on a ridge with it may have been fitted
+    with it: that a smaller set does as well shows only where it is fitted itself.
+    """
+    found: dict[tuple[str, ...], Model] = {}
+    larger = [answer]
+    while larger:
+        model = larger.pop(0)
+        for effect in model.effects if len(model.effects) > 1 else ():
+            if tuple(c.effect for c in model.effects if c != effect) not in found:
+                smaller = search.without(model, effect)
+                found[smaller.names] = smaller
+                larger.append(smaller)
+    return list(found.values())
+
+
+def _standing(search: Search, first: list[Model]) -> list[Model]:
+    """The `first` models, and those of other sets of effects, those that leave least first.
 
     Of each set its best models, however many: where they ended apart, all of them count.
     """
-    sets: dict[frozenset[str], list[Model]] = {frozenset(m.names): [m] for m in (before, after)}
+    sets: dict[frozenset[str], list[Model]] = {frozenset(m.names): [m] for m in first}
+    most = len(sets) + OTHERS
     for m in sorted(search.tried, key=lambda m: m.heldout):
-        of = sets.setdefault(frozenset(m.names), []) if len(sets) < MOST else sets.get(frozenset(m.names), [])
+        of = sets.setdefault(frozenset(m.names), []) if len(sets) < most else sets.get(frozenset(m.names), [])
         if len(of) < EXPANSIONS and all(m.fit.point != other.fit.point for other in of):
             of.append(m)
     return [m for of in sets.values() for m in of]

@@ -28,8 +28,6 @@ from .simpler import (
     with_fewer_faults,
     with_temperature_only,
     with_zero,
-    without_doubtful,
-    without_superfluous,
 )
 from .telling import probabilities, told, with_function
 from .thinning import thinned
@@ -37,7 +35,7 @@ from .verdicts import at_the_minimum
 from .weighing import is_credible
 
 MIN_CYCLES = 2
-UNLIKELY = 0.1  # probability of an effect with all that the record cannot tell from it, below which it is not named
+NAMED = 0.5  # probability of an effect with all that the record cannot tell from it, from which it is named
 N_BESIDE = 2  # turns in which faults of each cycle are found anew beside the effects
 
 
@@ -109,18 +107,17 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
     if not path.verdict_before.is_noise:
         after, v = with_fewer_faults(search, before, after, v, alike)
         after, v = simpler(search, before, after, v, alike, path.as_well)
-    after, v = without_superfluous(search, after, v, alike)
     if after is not settled:
         after, v = at_the_minimum(search, after, v)
-    after, v = without_doubtful(search, after, v, alike)
     after, v = with_temperature_only(search, after, v)
     after, v = with_zero(search, after, v, alike)
     sets = [(name, *rivals) for name, rivals in zip(after.names, alike, strict=True)]
     outcome, models = weighed(search, before, after)
-    unlikely = [names[0] for names in sets if sum(probabilities(outcome, after, *names)) < UNLIKELY]
+    unlikely = [names[0] for names in sets if sum(probabilities(outcome, after, *names)) < NAMED]
     if unlikely and (not models[0].effects or is_credible(models[0])):
         say(f"{' + '.join(models[0].names) or 'faults only'} instead of {' + '.join(after.names)}")
-        after, alike = models[0], [()] * len(models[0].effects)
+        of = dict(zip(after.names, alike, strict=True))
+        after, alike = models[0], [of.get(name, ()) for name in models[0].names]
         v = search.verdict(after) if after.effects else path.verdict_before
     elif unlikely:
         after, v, alike = before, path.verdict_before, []

@@ -1,4 +1,4 @@
-"""Fewer causes that do as well: one effect for several faults, nothing superfluous, nothing that may be nothing."""
+"""Fewer causes that do as well: one effect for several faults, and faults without what effects are as well."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .in_place import instead_of_faults, what_does_it_too, without_common_faults
 from .noise import Noise, Verdict
 from .search import CHANCE, Model, Search
 from .verdicts import NEARLY
-from .weighing import ALIKE, DOUBTFUL, is_alike, is_credible, is_enough, may_be_nothing
+from .weighing import ALIKE, DOUBTFUL, is_alike, is_credible, is_enough
 
 
 def _leaves_little(model: Model, v: Verdict, before: Model) -> bool:
@@ -93,24 +93,6 @@ def simpler(
     return m, w
 
 
-def without_superfluous(
-    search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]
-) -> tuple[Model, Verdict]:
-    """`model` without the effects that others have made superfluous, or that have only led the fit there."""
-    for effect in model.effects:
-        if len(model.effects) > 1 and search.owed_to(model, effect) < CHANCE:
-            model, v = _dropped(search, model, v, alike, effect, "is superfluous")
-    return model, v
-
-
-def without_doubtful(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
-    """`model` without the effects whose intervals hold nothing at all: they have only led the fit there."""
-    for effect in model.effects:
-        if may_be_nothing(search, model, effect):
-            model, v = _dropped(search, model, v, alike, effect, "may be nothing")
-    return model, v
-
-
 def with_temperature_only(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     """`model` with effects that go with the temperature and no constant part, where that may be nothing."""
     for place, effect in enumerate(model.effects):
@@ -128,19 +110,6 @@ def with_temperature_only(search: Search, model: Model, v: Verdict) -> tuple[Mod
         if made.heldout < model.heldout + SAME and (w.is_noise or not v.is_noise):
             model, v = made, w
     return model, v
-
-
-def _dropped(
-    search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]], effect: Candidate, why: str
-) -> tuple[Model, Verdict]:
-    """`model` without one of its effects, unless more is left without it."""
-    reduced = search.without(model, effect)
-    if reduced.heldout >= model.heldout + SAME:
-        return model, v
-    del alike[model.effects.index(effect)]
-    v = search.verdict(reduced)
-    search.say(f"{effect.effect} {why}: p = {v.p_value:.2g}")
-    return reduced, v
 
 
 def with_zero(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:

@@ -1,0 +1,32 @@
+"""What a search has fitted before it found the cause stays in its answer; the score takes it out again."""
+
+from __future__ import annotations
+
+import pytest
+
+from ema.core.records import Cycle, Record
+from ema.discrepancy.actuator.candidates import candidates
+from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.entrants import weighed
+from ema.discrepancy.actuator.fit import K_FREE
+from ema.discrepancy.actuator.noise import Noise
+from ema.discrepancy.actuator.plant import EmaPlant
+from ema.discrepancy.actuator.search import Search, start_model
+
+
+@pytest.mark.slow
+def test_what_was_fitted_on_the_way_to_the_cause_has_no_probability(hidden, shipped_plant):
+    made = hidden.cycles(hidden.Flaws(flux=-0.06), 4, 31, motions=(hidden.chirp(duration=0.25),))
+    plant = EmaPlant(shipped_plant, measured(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))]), 2)
+    search = Search(plant, Noise(plant, {}), [0, 1], [2, 3])
+    before = start_model(search, {})
+    first = {c.effect: c for c in reversed(candidates(shipped_plant, plant.data, ()))}
+    of = [first[name] for name in ("winding_resistance", "clock_skew", "magnet_flux")]
+    start = {name: x for c in of for name, x in c.probes()[0].items()}
+    answer = search.model(of, (*K_FREE, *(f for c in of for f in c.frees)), start, None, 4)
+    outcome, models = weighed(search, before, answer)
+    assert outcome.posterior[0].causes == ("magnet_flux",)
+    assert outcome.posterior[0].probability > 0.9
+    assert models[0].names == ("magnet_flux",)
+    flux, sd = outcome.sizes("magnet_flux")["magnet_flux.change"]
+    assert abs(flux + 0.06) < 3.0 * sd
