@@ -17,7 +17,8 @@ from ema.discrepancy.actuator.search import Search, start_model
 @pytest.mark.slow
 def test_what_was_fitted_on_the_way_to_the_cause_has_no_probability(hidden, shipped_plant):
     made = hidden.cycles(hidden.Flaws(flux=-0.06), 4, 31, motions=(hidden.chirp(duration=0.25),))
-    plant = EmaPlant(shipped_plant, measured(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))]), 2)
+    record = Record(tuple(Cycle(n, c) for n, c in enumerate(made)))
+    plant = EmaPlant(shipped_plant, measured(shipped_plant, [record]), 2)
     search = Search(plant, Noise(plant, {}), [0, 1], [2, 3])
     before = start_model(search, {})
     first = {c.effect: c for c in reversed(candidates(shipped_plant, plant.data, ()))}
