@@ -11,7 +11,7 @@ from ema.discrepancy.outcome import Outcome
 from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
-from . import stamps
+from . import ripple, stamps
 from .agreeing import together
 from .balance.as_effects import effects, point
 from .balance.found import Balance
@@ -66,7 +66,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     if plant.plant.neighbour is not None:
         notes.append(ALONE)
     notes += [f"implausible: {text}" for text in implausible(plant, outcome)]
-    notes += _moved(plant, outcome) + _kinds(plant) + _zeros(plant, outcome)
+    notes += _moved(plant, outcome) + _kinds(plant) + list(ripple.said(plant)) + _zeros(plant, outcome)
     return shared.Findings(
         verdict,
         found,
