@@ -19,6 +19,7 @@ import hidden_cases as cases
 import numpy as np
 
 from benchmarks.frozen_table import rate
+from benchmarks.kernel import costs
 from ema.core import config, resources
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
@@ -55,7 +56,9 @@ def examined(
         data = measured(plant, [record])
     except RecordError as error:
         return {**told, "outcome": "refused", "said": [str(error)]}
-    findings = examine(plant, data, n_threads=n_threads).findings.as_dict()
+    examination = examine(plant, data, n_threads=n_threads)
+    cost = costs(examination.search.plant.work, time.process_time() - begun)
+    findings = examination.findings.as_dict()
     found = {f"{e['name']}.{p}": q for e in findings["effects"] for p, q in e["parameters"].items()}
     true = {p: truth(values) for p, truth in cases.case(name).parameters.items() if p in found}
     sd = {p: (found[p]["high"] - found[p]["low"]) / 3.92 for p in true}
@@ -71,7 +74,7 @@ def examined(
         "covered": {p: found[p]["low"] <= x <= found[p]["high"] for p, x in true.items()}, **gain["heldout"],
         "k_after": gain["k_after"], "posterior": findings.get("posterior", [])[:5],
         "err_k_before": _err_k(gain["k_before"], k), "err_k_after": _err_k(gain["k_after"], k),
-        "false_alarms": [gain["false_alarms_before"], gain["false_alarms_after"]], "cpu_s": time.process_time() - begun,
+        "false_alarms": [gain["false_alarms_before"], gain["false_alarms_after"]], **cost,
         "tried": findings["tried"][:8], "said": findings["structure"].get("sentences", []) + findings["notes"],
     }  # fmt: skip
 
@@ -126,6 +129,11 @@ def table(rows: list[dict[str, Any]]) -> str:
     lines += _rates(several, "two or three effects at once: ")
     cpu = [row["cpu_s"] for row in rows]
     lines.append(f"processor time of a trial: median {np.median(cpu):.0f} s, largest {max(cpu):.0f} s")
+    times = [row["times_limit"] for row in rows if "times_limit" in row]  # older rows do not say
+    if times:
+        lines.append(
+            f"over what full lanes of the kernel would take: median {np.median(times):.1f}, largest {max(times):.1f}"
+        )
     if alarms:
         lines.append(
             f"false alarms without an effect: {rate(sum(row['verdict'] != 'adequate' for row in alarms), len(alarms))}"

@@ -21,7 +21,7 @@ import click
 import numpy as np
 
 from benchmarks.frozen import commit
-from benchmarks.kernel import BEST_LANES
+from benchmarks.kernel import costs
 from ema.core import config, resources
 from ema.core.names import FAULTS
 from ema.core.records import Record, read_record
@@ -30,7 +30,6 @@ from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.examine import examine
 from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.problem import ActuatorProblem
-from ema.discrepancy.actuator.runs import Work
 from ema.discrepancy.engine.search import Search
 from ema.discrepancy.engine.weighing import Budget
 from ema.discrepancy.progress import Progress
@@ -51,12 +50,6 @@ def record(name: str) -> Record:
         path = Path(folder) / f"{name}.csv"
         path.write_bytes(lzma.decompress((FOLDER / f"{name}.csv.xz").read_bytes()))
         return read_record(path)
-
-
-def costs(work: Work, cpu_s: float) -> dict[str, Any]:
-    """What an answer took: runs asked for and simulated, processor time, and that over what full lanes would take."""
-    limit = 1e-9 * BEST_LANES * work.steps
-    return {"asked": work.asked, "runs": work.simulated, "cpu_s": cpu_s, "times_limit": cpu_s / limit}
 
 
 def examined(name: str, n_threads: int) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ema.core import config, resources
+from ema.discrepancy.actuator.runs import Work
 from ema.effects import registry
 from ema.models import hf, lf1
 from ema.models.actuator import Actuator
@@ -35,6 +36,12 @@ def _best(work: Callable[[], Any], n: int = 5) -> float:
 def _sixteen(plant: Actuator, effects: hf.Effects | None = None) -> float:
     """Processor time of one run of sixteen. [s]"""
     return _best(lambda: hf.simulate(plant, np.zeros((16, 6)), seeds=SEED + np.arange(16), effects=effects)) / 16
+
+
+def costs(work: Work, cpu_s: float) -> dict[str, Any]:
+    """What an answer took: runs asked for and simulated, processor time, and that over what full lanes would take."""
+    limit = 1e-9 * BEST_LANES * work.steps
+    return {"asked": work.asked, "runs": work.simulated, "cpu_s": cpu_s, "times_limit": cpu_s / limit}
 
 
 def rows() -> list[dict[str, Any]]:

@@ -21,7 +21,7 @@ from .noise import Noise
 from .plant import EmaPlant, Point
 
 FLAT = 0.3  # length of a direction over that of the longest, below which it is simulated itself
-N_SEEDS = 8  # at least, of each half
+N_SEEDS = 8  # of each half
 SEEDS = 4_000_000, 5_000_000
 FELT = 60.0  # by how much the whitened features are to differ at either end of a direction
 N_STEPS = 2.0  # of finite differences, that no parameter is moved beyond
@@ -55,7 +55,6 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
     scale = np.linalg.norm(J, axis=0)
     if not scale.all() or not len(_flat(J := J / scale, FLAT)[0]):
         return fit
-    n_seeds = plant.n_seeds(cycles, N_SEEDS)
     point: Point = fit.point
     last: list[Point] = []
     for turn in range(N_TURNS):
@@ -70,8 +69,8 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
                 return fit
             break
         ways = scale * np.array([_difference(fit.free, *pair) for pair in ends])
-        here, *there = _halves(plant, noise, [point, *(p for pair in ends for p in pair)], cycles, n_seeds)
-        probed = _learnt(J, ways, np.array(there[1::2]) - np.array(there[::2]), n_seeds)
+        here, *there = _halves(plant, noise, [point, *(p for pair in ends for p in pair)], cycles)
+        probed = _learnt(J, ways, np.array(there[1::2]) - np.array(there[::2]))
         J = probed.J
         A, known, rows = _system(probed, here)
         step, _ = bounded(A * scale, known, *bounds(fit.free, point))
@@ -83,9 +82,9 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
             break
     last = last or [point]
     point = {name: float(np.mean([p[name] for p in last])) for name in point}
-    left = {c: x.mean(axis=0) for c, x in _by_cycle(plant, noise, [point], cycles, n_seeds)[0].items()}
+    left = {c: x.mean(axis=0) for c, x in _by_cycle(plant, noise, [point], cycles)[0].items()}
     parts = np.split(solution, np.cumsum([len(left[c]) for c in cycles])[:-1], axis=1)
-    found = concluded(plant, noise, fit.free, point, fit.columns, left, parts, 0.5 / n_seeds)
+    found = concluded(plant, noise, fit.free, point, fit.columns, left, parts, 0.5 / N_SEEDS)
     wandered = np.array([np.std([p[f.name] for p in last]) for f in fit.free])
     more = np.hypot(wandered, _unseen(noise, A * scale, len(_flat(J, FLAT)[0]), cycles))
     return replace(found, sd={name: float(np.hypot(x, y)) for (name, x), y in zip(found.sd.items(), more, strict=True)})
@@ -105,7 +104,7 @@ def _flat(J: Array, flat: float) -> tuple[Array, Array]:
     return FELT / length[is_flat], V[is_flat]
 
 
-def _learnt(J: Array, ways: Array, found: Array, n_seeds: int) -> Probed:
+def _learnt(J: Array, ways: Array, found: Array) -> Probed:
     """The Jacobian that agrees with what was found.
 
     Parameters
@@ -117,7 +116,7 @@ def _learnt(J: Array, ways: Array, found: Array, n_seeds: int) -> Probed:
     back = np.linalg.pinv(ways, rcond=0.1)
     first, second = (J + (back @ (found[:, half] - ways @ J.T)).T for half in (0, 1))
     shortest = float((ways**2).sum(axis=1).min())
-    return Probed((first, second), float(np.sqrt(len(J))) * 2.0 / n_seeds / shortest)
+    return Probed((first, second), float(np.sqrt(len(J))) * 2.0 / N_SEEDS / shortest)
 
 
 def _system(probed: Probed, r: Array) -> tuple[Array, Array, Array]:
@@ -139,17 +138,15 @@ def _system(probed: Probed, r: Array) -> tuple[Array, Array, Array]:
     return A, known, rows
 
 
-def _by_cycle(
-    plant: EmaPlant, noise: Noise, points: Sequence[Point], cycles: Sequence[int], n_seeds: int
-) -> list[dict[int, Array]]:
+def _by_cycle(plant: EmaPlant, noise: Noise, points: Sequence[Point], cycles: Sequence[int]) -> list[dict[int, Array]]:
     """Whitened residuals at several points by cycle, twice: shape (2, n_features)."""
-    first, second = (residuals_at(plant, noise, points, cycles, n_seeds, seed) for seed in SEEDS)
+    first, second = (residuals_at(plant, noise, points, cycles, N_SEEDS, seed) for seed in SEEDS)
     return [{c: np.array([a[c], b[c]]) for c in cycles} for a, b in zip(first, second, strict=True)]
 
 
-def _halves(plant: EmaPlant, noise: Noise, points: Sequence[Point], cycles: Sequence[int], n_seeds: int) -> list[Array]:
+def _halves(plant: EmaPlant, noise: Noise, points: Sequence[Point], cycles: Sequence[int]) -> list[Array]:
     """Whitened residuals at several points, all cycles one behind the other, twice: shape (2, n_features of all)."""
-    found = _by_cycle(plant, noise, points, cycles, n_seeds)
+    found = _by_cycle(plant, noise, points, cycles)
     return [np.concatenate([at[c] for c in cycles], axis=1) for at in found]
 
 

@@ -13,7 +13,7 @@ from .candidates import Candidate, candidates
 from .features import Array
 from .fit import SEED, Free, bounded, bounds, moved, residuals, stacked_jacobian
 from .plant import Point
-from .search import FAR, N_GLANCE, Model, Search
+from .search import FAR, N_GLANCE, N_GLANCE_FAR, Model, Search
 
 N_PROBE, N_PROBE_HIDDEN = 8, 24  # seeds of a column that only screens; of one that is hardly felt
 WIDER = 3.0  # times the step of an effect that is hardly felt
@@ -118,7 +118,8 @@ def simulated(search: Search, model: Model, screened: Sequence[Screened]) -> lis
         for s, other in zip(screened, alone, strict=True)
     ]
     points = [point for of in starts for point in of]
-    here, *there = search.costs([model.fit.point, *points], cycles, typical=True, steps=(DT_PROBE,) if far else None)
+    n_seeds, steps = (N_GLANCE_FAR, (DT_PROBE,)) if far else (N_GLANCE, None)
+    here, *there = search.costs([model.fit.point, *points], cycles, typical=True, n_seeds=n_seeds, steps=steps)
     cost = sum(float(r @ r) for r in model.fit.residuals.values())
     costs = iter(there)
     ranked = []

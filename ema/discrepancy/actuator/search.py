@@ -19,7 +19,7 @@ from .weak import Torque, torque
 
 N_FINAL = 16  # seeds of a mean that is judged
 FINAL_SEED = 3_000_000
-N_GLANCE = 4  # seeds that tell a good start from a bad one
+N_GLANCE, N_GLANCE_FAR = 4, 2  # seeds that tell a good start from a bad one; where a hundred times their noise is left
 K_SEEN = 0.01  # a fault that is there
 CHANCE = 0.03  # difference in misfit that seeds make
 FAR = 100.0  # excess from which candidates are simulated before they are ranked
@@ -163,14 +163,20 @@ class Search:
         return starts[best], costs[best]
 
     def costs(
-        self, points: Sequence[Point], cycles: Sequence[int], *, typical: bool, steps: Steps = None
+        self,
+        points: Sequence[Point],
+        cycles: Sequence[int],
+        *,
+        typical: bool,
+        n_seeds: int = N_GLANCE,
+        steps: Steps = None,
     ) -> list[float]:
         """Squared residual of some cycles at several points, at a glance.
 
         The typical one is a geometric mean over cycles and groups of features: far from the data a single one, where
         noise happens to be least, would decide what is nearer.
         """
-        left = residuals_at(self.plant, self.noise, points, cycles, N_GLANCE, SEED, steps)
+        left = residuals_at(self.plant, self.noise, points, cycles, n_seeds, SEED, steps)
         return [self._typical(at) if typical else sum(float(r @ r) for r in at.values()) for at in left]
 
     def _typical(self, left: dict[int, Array]) -> float:

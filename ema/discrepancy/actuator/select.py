@@ -14,7 +14,6 @@ from .search import FAR, Model, Search
 
 N_REFINED = 4
 WORTH_A_FIT = 0.1  # share of the squared residual beyond noise that a candidate must promise, to first order
-N_REFINED_AT_LEAST = 2
 NO_WORSE = 1.5  # times the squared residual of the best start, from which a start with fewer faults is not preferred
 REACHED = 1.5  # misfit of a model that may be the right one, but for noise that is not its own
 NEARLY_ALL = 0.01  # share of what there was to explain, up to which a rival may still leave it for want of iterations
@@ -68,7 +67,7 @@ def _likeliest(search: Search, model: Model, screened: Sequence[Screened], known
     for s in screened:
         if (known or found) and cost - s.promised < worth:
             break
-        if len(found) >= N_REFINED or (len(found) >= N_REFINED_AT_LEAST and _clear(search, found, s.promised)):
+        if len(found) >= N_REFINED or (found and _clear(search, found, s.promised)):
             break
         if s.candidate.effect not in {*known, *found}:
             found[s.candidate.effect] = _refined(search, model, s)
