@@ -22,6 +22,7 @@ from benchmarks.frozen_table import rate
 from benchmarks.kernel import costs
 from ema.core import config, resources
 from ema.core.errors import RecordError
+from ema.core.names import FAULTS
 from ema.core.records import Cycle, Record
 from ema.core.version import version
 from ema.discrepancy.actuator.cycles import measured
@@ -72,11 +73,19 @@ def examined(
         "parameter_errors": {p: found[p]["value"] / x - 1.0 for p, x in true.items() if x},
         "z": {p: (found[p]["value"] - x) / sd[p] for p, x in true.items() if sd[p] > 0.0},
         "covered": {p: found[p]["low"] <= x <= found[p]["high"] for p, x in true.items()}, **gain["heldout"],
-        "k_after": gain["k_after"], "posterior": findings.get("posterior", [])[:5],
+        "k_after": gain["k_after"], "k_interval": gain.get("k_interval"), "z_k": _z_k(gain, k),
+        "posterior": findings.get("posterior", [])[:5],
         "err_k_before": _err_k(gain["k_before"], k), "err_k_after": _err_k(gain["k_after"], k),
         "false_alarms": [gain["false_alarms_before"], gain["false_alarms_after"]], **cost,
         "tried": findings["tried"][:8], "said": findings["structure"].get("sentences", []) + findings["notes"],
     }  # fmt: skip
+
+
+def _z_k(gain: dict[str, Any], k: list[float]) -> dict[str, float]:
+    """Deviations of the faults that are there; of those that are not, an interval ends at nothing."""
+    ends = zip(FAULTS, gain["k_after"], gain.get("k_interval", []), k, strict=False)
+    sd = {name: (max(x - low, high - x) / 1.96, x - true) for name, x, (low, high), true in ends if true > 0.0}
+    return {name: off / of for name, (of, off) in sd.items() if of > 0.0}
 
 
 def _told(row: dict[str, Any]) -> str:

@@ -81,10 +81,10 @@ def rate(answer: dict[str, Any], names: list[str]) -> str:
 
 
 def rate_outside(answer: dict[str, Any]) -> str:
-    """Outside the library nothing may be named with confidence, and the verdict must stay unexplained."""
+    """Outside the library nothing may be named with confidence, and the verdict must say that a rest is left."""
     if any(sure > CONFIDENT for _, sure, _, _ in answer["effects"]):
         return "wrong"
-    return "right" if answer["verdict"] == "unexplained" else "missed"
+    return "right" if answer["verdict"] in ("unexplained", "partly explained") else "missed"
 
 
 def parameter_error(answer: dict[str, Any]) -> float:

@@ -120,7 +120,7 @@ def _aims(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
     wrong = [row for row in rows if _is_confidently_wrong(row)]
     said = [row for row in outside if row["outcome"] == "right"]
     kinds = {row["case"] for row in outside}
-    z = [x for row in rows for x in row["z"].values()]
+    z = [x for row in rows for x in (*row["z"].values(), *row.get("z_k", {}).values())]
     known = [row for row in rows if row.get("k_after")]
     false = [row for row in known if _is_invented(row)]
     loud = [row for row in rows if row["verdict"] == "explained" and row["err_after"] > EXPLAINED * row["noise_floor"]]
@@ -161,7 +161,10 @@ def _is_confidently_wrong(row: Row) -> bool:
 
 
 def _is_invented(row: Row) -> bool:
-    return any(k > INVENTED and true == 0.0 for k, true in zip(row["k_after"], row["k"], strict=True))
+    """A fault that is told and is not there; where intervals were told, one that holds nothing tells none."""
+    lows = [low for low, _ in row["k_interval"]] if row.get("k_interval") else row["k_after"]
+    told = zip(row["k_after"], lows, row["k"], strict=True)
+    return any(k > INVENTED and low > 0.0 and true == 0.0 for k, low, true in told)
 
 
 def _strata(rows: Sequence[Row]) -> list[tuple[str, str, str, str]]:

@@ -77,6 +77,15 @@ def test_a_fault_that_is_not_there_and_an_explanation_that_leaves_much_are_count
     assert cells(text, "explained with more")[1].startswith("1 of 2")
 
 
+def test_a_fault_whose_interval_holds_nothing_is_not_told_and_intervals_of_faults_count():
+    k = [0.0, 0.0, 0.02, 0.0, 0.0, 0.0]
+    unsure, sure = ([[0.0, 0.0], [0.0, 0.0], [low, 0.04], *[[0.0, 0.0]] * 3] for low in (0.0, 0.001))
+    rows = [row(), row(1, k_after=k, k_interval=unsure), row(2, k_after=k, k_interval=sure, z_k={"k4": 5.0})]
+    text = frozen_table.table(rows)
+    assert cells(text, "trials with a fault")[1].startswith("1 of 3")
+    assert cells(text, "intervals of 95%")[1].startswith(f"{len(rows)} of {len(rows) + 1}")
+
+
 def test_the_first_set_of_the_posterior_has_a_diagram_of_its_own():
     first = {"effects": ["spring_load", "cogging"], "probability": 0.9}
     text = frozen_table.table([row(posterior=[first])])
