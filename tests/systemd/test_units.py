@@ -39,6 +39,15 @@ def test_no_core_file_holds_a_key(unit):
     assert "LimitCORE=0" in resources.systemd(unit).read_text().splitlines()
 
 
+def test_the_worker_starts_restarts_and_stops_with_its_daemon():
+    """What the two say to each other is that of one version: after an upgrade neither may stay behind."""
+    worker = resources.systemd("ema-hf-worker@.service").read_text().splitlines()
+    assert "PartOf=ema-daemon@%i.service" in worker
+    assert "WantedBy=ema-daemon@%i.service" in worker
+    upgrade = (ROOT / "tools/deb/postinst").read_text()
+    assert "try-restart 'ema-daemon@*.service' 'ema-hf-worker@*.service'" in upgrade
+
+
 @needs_systemd_analyze
 @pytest.mark.parametrize("unit", UNITS)
 def test_unit_is_understood(unit, tmp_path):
