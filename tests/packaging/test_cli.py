@@ -3,7 +3,9 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tomllib
 from importlib.metadata import entry_points
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -75,3 +77,26 @@ def test_wrong_use_is_one_line_and_status_two(arguments, says, tmp_path, monkeyp
     assert says in result.stderr
     assert "Traceback" not in result.stderr
     assert not (tmp_path / "x").exists()
+
+
+INTERRUPTED_WHILE_LOADING = """
+import sys
+class CtrlC:
+    def find_spec(self, name, path=None, target=None):
+        if name == {name!r}:
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, CtrlC())
+from {module} import {function}
+{function}()
+"""
+
+
+@pytest.mark.parametrize("name", ["click", "yaml"], ids=["the command line", "a subcommand"])
+def test_an_interruption_while_all_is_still_being_loaded_is_one_line(name):
+    scripts = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]["scripts"]
+    module, _, function = scripts["ema"].partition(":")
+    program = INTERRUPTED_WHILE_LOADING.format(name=name, module=module, function=function)
+    arguments = ["identify", "--bundle", "nowhere", "nothing.csv"]
+    done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 130
+    assert done.stderr.strip() == "ema: interrupted"
