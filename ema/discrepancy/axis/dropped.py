@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ema.core.records import Array
-from ema.discrepancy.examine import at_bound
 from ema.discrepancy.fitting import Fit, best_fit
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Candidate, Free
+from ema.discrepancy.trust import at_bound
 from ema.models.axis_config import LinearAxis
 
 from .linear import in_metres

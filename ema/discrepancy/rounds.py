@@ -1,0 +1,177 @@
+"""Rounds of a selection: what is added to a model, dropped from it, or takes the place of something in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .grade import LIMIT
+from .plant import Candidate, Plant, Point
+from .progress import Progress
+from .selection import FORM, Tried, above_noise, choice, compare, fit_model, is_worth_it, one_more
+from .verdict import Verdict, judge
+
+MAX_EFFECTS = 3
+MAX_TERMS = 3
+MAX_ADDED = 5  # of both kinds, further lines of a kind that is there already counted too
+IMMATERIAL = 0.01  # of the noise's mean square: what takes less is told, and no cause: no plant file is that exact
+MANY = 12  # free parameters from which an effect is revised beside its strongest rivals only
+N_RIVALS = 6
+
+
+@dataclass
+class State:
+    """Models without effects and so far, and for each accepted effect the trials in its place and the model without."""
+
+    plain: Tried
+    model: Tried
+    rounds: list[tuple[dict[str, Tried], Tried]]
+    tried: list[dict[str, Any]]
+    n_rounds: int = 0
+    library_only: bool = False  # no nameless terms
+    immaterial: str = ""  # what ended the selection by taking less than matters
+
+
+def is_explained(plant: Plant, plain: Tried, model: Tried) -> bool:
+    """Noise is left, or little more, or what the wrong form of the laws found may leave."""
+    if model.rms <= LIMIT:
+        return True
+    if above_noise(model) < FORM**2 * above_noise(plain):
+        return True
+    return judged(plant, model).is_noise
+
+
+def judged(plant: Plant, model: Tried) -> Verdict:
+    """Whether what a model leaves of held-out parts is noise."""
+    n_free = sum(len(f.free) for f in model.fits)
+    return judge(model.held_out, noise_uncertainty=plant.noise_uncertainty, n_free=n_free)
+
+
+def select(plant: Plant, state: State, progress: Progress) -> None:
+    """Forward selection until the residual is noise, nothing helps, or enough kinds are in the model.
+
+    Dry friction has side minima: where the model does as well without an effect, begun where the fit with it ended, the
+    gain was not the effect's own.
+    """
+    begun_anew_with = -1  # effects
+    while not judged(plant, state.model).is_noise:
+        trials = _round(plant, state, state.model, progress)
+        best = choice(trials, state.model) if trials else None
+        if best is None or not is_worth_it(trials[best], state.model):
+            return
+        candidate = trials[best].accepted[-1]
+        if candidate.is_structure and is_explained(plant, state.plain, state.model):
+            return  # what the wrong form of a law leaves needs no cause of its own
+        kinds = {c.effect for c in state.model.accepted if c.is_structure == candidate.is_structure}
+        if candidate.effect not in kinds and len(kinds) >= (MAX_TERMS if candidate.is_structure else MAX_EFFECTS):
+            return
+        if len(state.model.accepted) >= MAX_ADDED:
+            return
+        if (mark := above_noise(state.model) - above_noise(trials[best])) < IMMATERIAL:
+            state.immaterial = f"{candidate.key} would take {mark:.1%} of the noise's mean square from it"
+            return
+        n = len(state.model.accepted)
+        again = leave_out(plant, trials[best], {n})
+        if compare(again, state.model).gain > 0.0 and not is_worth_it(trials[best], again):
+            if n == begun_anew_with:
+                return
+            begun_anew_with = n
+            state.model, state.plain = again, again if n == 0 else state.plain
+            continue
+        state.rounds.append((trials, state.model))
+        state.model = trials[best]
+
+
+def without_terms(plant: Plant, state: State, progress: Progress) -> State:
+    """Effects of the library alone, where they foretell held-out parts as well as with nameless terms.
+
+    One term may do what two effects do: friction that knows directions beside a spring is a force along the travel.
+    """
+    if not any(c.is_structure for c in state.model.accepted):
+        return state
+    progress("effects of the library alone")
+    other = State(state.plain, state.plain, [], state.tried, state.n_rounds, library_only=True)
+    select(plant, other, progress)
+    revise(plant, other, progress)
+    few = len(other.model.accepted) <= len(state.model.accepted) + 1
+    as_well = is_explained(plant, other.plain, other.model) and not compare(state.model, other.model).is_clear
+    return other if few and as_well else state
+
+
+def _strongest(trials: dict[str, Tried], before: Tried) -> set[str]:
+    gains = {key: compare(trial, before).gain for key, trial in trials.items()}
+    return set(sorted(gains, key=lambda key: -gains[key])[:N_RIVALS])
+
+
+def _round(
+    plant: Plant, state: State, model: Tried, progress: Progress, only: set[str] | None = None
+) -> dict[str, Tried]:
+    """Everything that could be added to a model: effects of the library, and nameless terms beside them."""
+    state.n_rounds += 1
+    number = state.n_rounds
+
+    def suggest(point: Point, blocks: Sequence[int]) -> Sequence[Candidate]:
+        everything = [*plant.candidates(point, blocks)]
+        if not state.library_only:
+            everything += plant.structure(point, blocks)
+        return [c for c in everything if only is None or c.key in only]
+
+    trials = one_more(plant, model, suggest, lambda key: progress(f"round {number}: {key}"))
+    scale = min((t.scale for t in trials.values()), default=1.0)
+    for key, trial in trials.items():
+        gain = compare(trial, model, scale)
+        progress.fitted([c.key for c in trial.accepted], trial.rms, trial.fits[0].point)
+        state.tried.append({"name": key, "round": number, "score": gain.gain, "error": gain.error, "rms": trial.rms})
+    return trials
+
+
+def revise(plant: Plant, state: State, progress: Progress) -> None:
+    """Look again at each effect beside the later ones: drop what they made superfluous, replace what they unmasked."""
+    k = 0
+    while len(state.model.accepted) > 1 and k < len(state.model.accepted):
+        own = state.model.accepted[k]
+        progress(f"without {own.key}")
+        reduced = leave_out(plant, state.model, {k})
+        if not is_worth_it(state.model, reduced):
+            state.model = reduced
+            del state.rounds[k]
+            continue
+        last = k == len(state.model.accepted) - 1
+        if own.is_structure or last:
+            state.rounds[k] = (state.rounds[k][0], reduced)
+            k += 1
+            continue
+        many = len(reduced.fits[0].free) > MANY
+        rivals = _strongest(state.rounds[k][0], state.rounds[k][1]) if many else None
+        trials = _round(plant, state, reduced, progress, rivals)
+        trials[own.key] = state.model
+        best = choice(trials, reduced) or own.key
+        if best != own.key and compare(trials[best], state.model).is_clear:
+            model = trials[best]
+            del state.rounds[k]
+            state.rounds.append((trials, reduced))
+            state.model = model  # the new one stands last
+            k += 1
+            continue
+        state.rounds[k] = (trials, reduced)
+        k += 1
+
+
+def leave_out(plant: Plant, model: Tried, out: set[int]) -> Tried:
+    """The model without some of its candidates, fitted again."""
+    models = [tuple(c for j, c in enumerate(m) if j not in out) for m in model.models]
+    base = {f.name for f in plant.base}
+    starts = []
+    for fitted, m in zip(model.fits, model.models, strict=True):
+        point = fitted.point
+        for j in out:
+            point = _without(point, m[j], base)
+        starts.append([point])
+    return fit_model(plant, models, starts)
+
+
+def _without(point: Point, candidate: Candidate, base: set[str]) -> Point:
+    """The point less what belongs to the candidate (a start may also propose base parameters: these stay)."""
+    own = {f.name for f in candidate.free} | {name for start in candidate.starts for name in start}
+    return {name: value for name, value in point.items() if name in base or name not in own}
