@@ -21,6 +21,8 @@ From this the engine derives, in this order and each in its own module:
 `verdict`      is a whitened residual noise?  A calibrated test at several time scales
 `selection`    forward selection with every score taken on blocks the parameters were not fitted on; the
                set of what the data cannot tell apart
+`rounds`       what is added to a model, dropped from it, or takes the place of something in it
+`trust`        how far effects stand out of what is unknown
 `examine`      the whole run: verdict, effects, structure, gain  →  `findings.Findings`
 =============  ======================================================================================
 """

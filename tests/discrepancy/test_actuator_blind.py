@@ -17,15 +17,14 @@ from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.examine import examine, split
-from ema.discrepancy.actuator.fit import K_FREE
-from ema.discrepancy.actuator.forward import exchanged, instead_of_all
+from ema.discrepancy.actuator.forward import exchanged, extend, instead_of_all
+from ema.discrepancy.actuator.free import K_FREE
 from ema.discrepancy.actuator.growing import is_steady
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.paths import Path, beside_steady
 from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.screening import promising, simulated
 from ema.discrepancy.actuator.search import Search, start_model
-from ema.discrepancy.actuator.select import extend
 from ema.discrepancy.actuator.verdicts import at_the_minimum
 from ema.models.actuator import Actuator
 

@@ -8,7 +8,7 @@ from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.entrants import weighed
-from ema.discrepancy.actuator.fit import K_FREE
+from ema.discrepancy.actuator.free import K_FREE
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.search import Search, start_model

@@ -6,8 +6,9 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.cycles import measured
-from ema.discrepancy.actuator.fit import K_FREE, fit, free
+from ema.discrepancy.actuator.fit import fit
 from ema.discrepancy.actuator.flat import settled
+from ema.discrepancy.actuator.free import K_FREE, free
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
 

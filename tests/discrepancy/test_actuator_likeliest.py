@@ -10,7 +10,7 @@ from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator import examine as whole
 from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.cycles import measured
-from ema.discrepancy.actuator.fit import K_FREE
+from ema.discrepancy.actuator.free import K_FREE
 from ema.discrepancy.actuator.paths import Path
 
 DRAG = 7e-5

@@ -11,7 +11,7 @@ from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.conditions import as_recorded
 from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.examine import split
-from ema.discrepancy.actuator.fit import K_FREE
+from ema.discrepancy.actuator.free import K_FREE
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.ridge import walked

@@ -10,7 +10,7 @@ from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.examine import split
-from ema.discrepancy.actuator.fit import K_FREE
+from ema.discrepancy.actuator.free import K_FREE
 from ema.discrepancy.actuator.motions import motions
 from ema.discrepancy.actuator.next_recording import THE_SAME, next_recording
 from ema.discrepancy.actuator.noise import Noise

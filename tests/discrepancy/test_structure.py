@@ -9,8 +9,8 @@ import pytest
 from tools.imports import circle, imports, longest_chain, untested
 
 TESTS = Path(__file__).parent.parent
-LONGEST_CHAIN = 20  # modules; wanted: 8
-UNTESTED = 60  # wanted: none
+LONGEST_CHAIN = 13  # modules; wanted: 8
+UNTESTED = 65  # wanted: none
 
 
 @pytest.fixture(scope="module")

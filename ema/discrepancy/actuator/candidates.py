@@ -12,14 +12,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ema.core.names import FAULTS
+from ema.discrepancy.plant import Point
 from ema.effects import registry
 from ema.models.actuator import Actuator
 
-from .cycles import Measured
 from .features import Array
-from .fit import Free, free
+from .free import Free, free
 from .gear import Resonance
-from .plant import Point
+from .measured import Measured
 from .weak import Torque, bumps, lines
 
 FLAT, FLAT_SAMPLES = 5e-3, 10  # [A] samples of one cycle at the largest current that make a clipped top

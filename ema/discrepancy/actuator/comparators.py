@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ema.discrepancy.plant import Point
+
 from .fit import excess_at
 from .noise import Noise
-from .plant import NOISE_STEPS, STEPS, EmaPlant, Point
+from .plant import NOISE_STEPS, STEPS, EmaPlant
 
 # [s] roughly: a whole number makes a control period
 TRIED = (2.5e-7, 5e-7, 1e-6, 1.5e-6, 2e-6, 3e-6, 4e-6, 5e-6, 7e-6, 1e-5, 1.4e-5, 2e-5)

@@ -13,21 +13,15 @@ import numpy as np
 
 from ema.models.actuator import Actuator
 
-from .features import Array, Signals, local_mean, motor_torque
+from .features import Array, Signals, local_mean, motor_torque, roughness
 
 WITHIN = 1.3  # factor by which noise may differ from the plant file's before it is replaced
-SECOND_DIFFERENCE = np.sqrt(6.0)  # rms of x[t] - 2 x[t-1] + x[t-2] over that of white x
 SMOOTH = 101  # samples over which a user position is taken as straight but for noise
 SUPPLY_MEAN = 5e-3  # [s]
 SUPPLY_TOLERANCE = 2e-3  # of the plant file's voltage
 DITHER = 0.13  # of a step of the LVDT, rms; runs with less noise switch in step with each other, not with a record
 SEED = 20_260_101
 N_BISECTIONS = 30
-
-
-def roughness(x: Array) -> float:
-    """Rms of the second difference along the last axis, as that of white noise of the same rms."""
-    return float(np.sqrt(np.mean(np.diff(x, 2, axis=-1) ** 2))) / SECOND_DIFFERENCE
 
 
 def current_noise(plant: Actuator, signals: Sequence[Signals]) -> float:

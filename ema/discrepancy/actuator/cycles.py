@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from ema.core.names import CURRENTS, FAULTS
@@ -18,6 +16,7 @@ from ema.models.turns import nearest_turn
 
 from .checks import check_rate, check_signals
 from .features import Array, Signals, features, stacked
+from .measured import Measured
 from .sampling import between, positions_every
 from .zeros import zero_apart
 
@@ -34,70 +33,6 @@ SAME_COMMAND, LOCAL = 1e-6, 5e-3  # [rad] by which commands of one motion may di
 COUNTED = (4.0, 100.0, np.inf)  # steps between values that a rough, a better and a good step tell apart
 OFF_GRID = 0.2  # of a step, by which few decimals may put values beside it
 AS_NOISE = 1.15  # times the noise that a curve through it may leave
-
-
-@dataclass(frozen=True)
-class Measured:
-    """All cycles of the records, as the engine wants them.
-
-    Attributes
-    ----------
-    labels : tuple of str
-    commands : list of arrays
-        Commanded user position of each *motion*. [rad]
-    motion : array of int, shape (n_cycles,)
-        Which motion each cycle is.
-    signals : list of Signals
-        One run each.
-    y : list of arrays, shape (n_features,)
-        Features of each cycle.
-    envelopes : list of arrays
-        [A]
-    start : array, shape (n_cycles, 2)
-        θ_u and θ_m at the start. [rad]
-    speed : array, shape (n_cycles,)
-        ω_m at the start: a record may be cut out of a longer motion. [rad/s]
-    user_speed : array, shape (n_cycles,)
-        ω_u at the start: behind play or a soft gear the user may still swing when the rotor rests. [rad/s]
-    holding : array, shape (n_cycles, 3)
-        Phase currents at the start, their mean taken off. [A]
-    dT : array, shape (n_cycles,)
-        Winding temperature less 20 °C; zero where it was not recorded. [K]
-    has_temperature : bool
-    angle_step : float
-        Resolution of the recorded rotor angle, 0 if finer than can be seen. [rad]
-    angle_noise : float
-        White noise of the recorded rotor angle, 0 if less than its motion hides. [rad rms]
-    zero : float
-        θ_m/GR less θ_u in the middle of the play, 0 if not clear. [rad]
-    every : int
-        Samples from one recorded position to the next, where the record holds straight lines between them; else 1.
-    faults : array, shape (n_cycles, 6)
-        What each cycle's faults differ by from those of the record.
-    """
-
-    labels: tuple[str, ...]
-    commands: list[Array]
-    motion: NDArray[np.int64]
-    signals: list[Signals]
-    y: list[Array]
-    envelopes: list[Array]
-    start: Array
-    speed: Array
-    user_speed: Array
-    holding: Array
-    dT: Array
-    has_temperature: bool
-    angle_step: float
-    angle_noise: float
-    zero: float
-    every: int
-    faults: Array
-
-    @property
-    def n_cycles(self) -> int:
-        """Number of cycles."""
-        return len(self.labels)
 
 
 def measured(plant: Actuator, records: Sequence[Record]) -> Measured:

@@ -11,7 +11,8 @@ from ema.discrepancy.engine.contest import EXPANSIONS, Contest, Entrant, Outcome
 from ema.discrepancy.engine.statistic import Whitening
 
 from .features import Array
-from .fit import K_FREE, columns
+from .fit import columns
+from .free import K_FREE
 from .noise import SEED, Noise
 from .problem import ActuatorProblem, as_cause
 from .search import Model, Search

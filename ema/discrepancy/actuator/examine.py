@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ema.core.errors import RecordError
-from ema.discrepancy.findings import Findings
 from ema.discrepancy.progress import Progress
 from ema.models.actuator import Actuator
 
 from .conditions import as_recorded
-from .cycles import Measured
 from .entrants import weighed
+from .examination import Examination
 from .gear import swinging
 from .growing import beside, growing, said, widened
+from .measured import Measured
 from .next_recording import next_recording
-from .noise import Noise, Verdict
+from .noise import Noise
 from .paths import beside_steady, faults_only, gone_on, resume, shortest, with_faults
 from .plant import EmaPlant
 from .play import as_held, with_friction
-from .search import Model, Search
+from .search import Search
 from .simpler import (
     simpler,
     still_alike,
@@ -37,18 +37,6 @@ from .weighing import is_credible
 MIN_CYCLES = 2
 NAMED = 0.5  # probability of an effect with all that the record cannot tell from it, from which it is named
 N_BESIDE = 2  # turns in which faults of each cycle are found anew beside the effects
-
-
-@dataclass(frozen=True)
-class Examination:
-    """The answer with what the report draws."""
-
-    findings: Findings
-    search: Search
-    before: Model
-    after: Model
-    verdict_before: Verdict
-    verdict_after: Verdict
 
 
 def split(data: Measured) -> tuple[list[int], list[int]]:

@@ -32,6 +32,7 @@ from ema.models.actuator import Actuator
 
 Array = NDArray[np.float64]
 
+SECOND_DIFFERENCE = np.sqrt(6.0)  # rms of x[t] - 2 x[t-1] + x[t-2] over that of white x
 SECTORS = 24  # per electrical turn
 FEW = 20.0  # samples in a sector from which its mean counts half
 I_SIGN = 0.3  # [A] current at which its sign is taken for half certain
@@ -79,6 +80,11 @@ class Signals:
 def spacing(seconds: float, rate: float, n_times: int) -> int:
     """Samples from one node to the next."""
     return max(round(seconds * rate), 2, n_times // MAX_NODES)
+
+
+def roughness(x: Array) -> float:
+    """Rms of the second difference along the last axis, as that of white noise of the same rms."""
+    return float(np.sqrt(np.mean(np.diff(x, 2, axis=-1) ** 2))) / SECOND_DIFFERENCE
 
 
 def local_mean(x: Array, m: int) -> Array:

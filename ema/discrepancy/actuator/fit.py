@@ -9,40 +9,20 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ema.core.names import FAULTS
-from ema.effects import registry
+from ema.discrepancy.plant import Point
 
 from .features import Array
+from .free import K_STEP, Free
 from .noise import Noise, disagreement, scatter
-from .plant import EmaPlant, Point, Steps
+from .plant import EmaPlant, Steps
 
 N_SEEDS = 8  # at least, while searching
 N_COLUMN = 12  # seeds of a column of the Jacobian
 SEED = 1_000_000
-K_STEP = 0.03  # below, the switching noise of a difference is as large as the difference
 TRUSTED = 0.75  # share of the promised gain, below which columns are taken anew
 LENGTH = 150.0  # of a step, in standard deviations of a cycle: four times the noise of one cycle's features
 FAR_OFF = 1.5  # misfit above which steps may be longer than first order says
 SHORT = 75.0  # of a step near the end, where the curvature of the response counts for more than noise
-
-
-@dataclass(frozen=True)
-class Free:
-    """A parameter to be fitted: its bounds and the step of its finite difference."""
-
-    name: str
-    low: float
-    high: float
-    step: float
-
-
-K_FREE = tuple(Free(name, 0.0, 1.0, K_STEP) for name in FAULTS)
-
-
-def free(name: str, step: float | None = None) -> Free:
-    """A free parameter of an effect, by its registered bounds; the step from where a search begins."""
-    effect, parameter = name.split(".")
-    p = next(p for p in registry()[effect].parameters if p.name == parameter)
-    return Free(name, p.low, p.high, step if step is not None else (p.start - p.neutral) or 0.1 * (p.high - p.low))
 
 
 Columns = dict[tuple[int, str], Array]  # by motion and name of the parameter; not whitened, per unit

@@ -15,10 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ema.discrepancy.plant import Point
+
 from .features import Array
-from .fit import Fit, Free, bounded, bounds, concluded, moved, residuals_at, stacked_jacobian
+from .fit import Fit, bounded, bounds, concluded, moved, residuals_at, stacked_jacobian
+from .free import Free
 from .noise import Noise
-from .plant import EmaPlant, Point
+from .plant import EmaPlant
 
 FLAT = 0.3  # length of a direction over that of the longest, below which it is simulated itself
 N_SEEDS = 8  # of each half

@@ -25,10 +25,20 @@ from ema.faults import backlash
 from ema.models import jit  # noqa: F401  where compiled functions are kept
 from ema.models.actuator import Actuator
 
-from .conditions import roughness
-from .cycles import Measured
-from .features import GROUPS, Array, acceleration, current_lag, delayed, load_torque, local_mean, motor_torque, spacing
-from .play import PLAYS, held_user
+from .features import (
+    GROUPS,
+    Array,
+    acceleration,
+    current_lag,
+    delayed,
+    load_torque,
+    local_mean,
+    motor_torque,
+    roughness,
+    spacing,
+)
+from .held import PLAYS, held_user
+from .measured import Measured
 
 FREQUENCIES = np.geomspace(100.0, 2000.0, 32)  # [rad/s]
 DAMPINGS = (0.01, 0.03, 0.1, 0.3)

@@ -15,13 +15,14 @@ from dataclasses import replace
 import numpy as np
 
 from ema.core.names import FAULTS
+from ema.discrepancy.plant import Point
 from ema.effects import registry
 
 from .candidates import WARMER
 from .features import Array
-from .fit import K_FREE, N_SEEDS, Columns, Fit, Free, fit, free, residuals, stacked_jacobian
+from .fit import N_SEEDS, Columns, Fit, fit, residuals, stacked_jacobian
+from .free import K_FREE, Free, free
 from .noise import scatter
-from .plant import Point
 from .search import Model, Search
 
 DIFFER = 1.5  # times what noise makes of the differences between cycles of one motion

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ema.discrepancy.folds import Folds, dealt
+from ema.discrepancy.plant import Point
 
 from .features import Array
 from .fit import SEED, bounded, bounds, columns, moved, residuals, stacked_jacobian
-from .plant import ENVELOPE_STEP, EmaPlant, Point
+from .plant import ENVELOPE_STEP, EmaPlant
 from .search import FINAL_SEED, N_FINAL, N_GLANCE, Model, Search
 
 N_FOLDS = 8  # at most; of more cycles several are left out together

@@ -10,10 +10,11 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import gamma
 
 from ema.discrepancy.engine.statistic import shrunk_correlation
+from ema.discrepancy.plant import Point
 
-from .cycles import Measured
 from .features import Array
-from .plant import EmaPlant, Point
+from .measured import Measured
+from .plant import EmaPlant
 from .runs import Runs
 from .thinning import spread
 

@@ -5,19 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ema.core.names import FAULTS
+from ema.discrepancy.plant import Point
 
 from .comparators import PLAIN, take_step
 from .features import Array
 from .forward import CLOSE, exchanged, grown, instead_of_all
 from .growing import is_steady
 from .noise import Noise, Verdict
-from .plant import EmaPlant, Point
-from .search import CHANCE, Model, Search, start_model
+from .plant import EmaPlant
+from .search import CHANCE, DISTANT, Model, Search, start_model
 from .simpler import simpler
-from .telling import FAULT_ALARM
 from .timing import samples_late
-from .verdicts import NEARLY, as_on_the_bench, surely
-from .weighing import DISTANT
+from .verdicts import FAULT_ALARM, NEARLY, as_on_the_bench, surely
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ema.discrepancy.plant import Point
 from ema.discrepancy.report import Picture, picture
 from ema.effects.base import T_REFERENCE
 
-from .examine import Examination
+from .examination import Examination
 from .features import GROUPS, SECTORS, Array
 from .leave_out import settled
-from .plant import ENVELOPE_STEP, Point
+from .plant import ENVELOPE_STEP
 from .search import FINAL_SEED, N_FINAL
 from .thinning import spread
 from .weak import ORDERS, Torque, line, share_explained, torque

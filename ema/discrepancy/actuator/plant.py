@@ -13,15 +13,16 @@ from functools import cached_property
 import numpy as np
 
 from ema.core.names import FAULTS, PHASES
+from ema.discrepancy.plant import Point
 from ema.effects import registry
 from ema.models import hf
 from ema.models.actuator import Actuator
 from ema.models.layout import STATE
 
-from .cycles import Measured
 from .features import Array, Signals, features, floors, slices, stacked
 from .gear import Resonance, resonance
-from .runs import Asked, Memory, Point, Runs, Work
+from .measured import Measured
+from .runs import Asked, Memory, Runs, Work
 from .sampling import straightened
 
 Steps = tuple[float, ...] | None  # None: the plant's

@@ -11,20 +11,18 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ema import faults
 from ema.discrepancy.findings import Findings
-from ema.effects.backlash import follow
 from ema.models import jit  # noqa: F401  where compiled functions are kept
 from ema.models.actuator import Actuator
 
-from .cycles import Measured
 from .features import GROUPS, Array, load_torque, local_mean, motor_torque, spacing
+from .held import PLAYS, pressed_user
+from .measured import Measured
 
 LOADS = {"constant_load", "spring_load", "position_torque"}
 CLEAR = 0.3  # share of the gap's squared rest below which the user is taken as moved by its load
-PLAYS = np.concatenate([[0.0], np.geomspace(1e-3, 1.0, 20)])  # k2 that are tried
 QUANTILES = np.linspace(0.02, 0.98, 25)  # of the positions, at which a load may change its sign
 HOLDS = np.array([0.0, 0.04, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3, 0.4, 0.5])  # of the travel, to either side of there
 SPEED = 2.0  # [rad/s] over which friction changes its sign
@@ -73,7 +71,7 @@ def pressed(plant: Actuator, data: Measured) -> Pressed | None:
     gaps = [_level(local_mean(shaft - s.theta_u[0], m)) for shaft, s in zip(shafts, data.signals, strict=True)]
 
     def left(by: Pressed) -> float:
-        users = [_user(shaft, start, *by) for shaft, start in zip(shafts, starts, strict=True)]
+        users = [pressed_user(shaft, start, *by) for shaft, start in zip(shafts, starts, strict=True)]
         predicted = [_level(local_mean(shaft - user, m)) for shaft, user in zip(shafts, users, strict=True)]
         return sum(float(((gap - x) ** 2).sum()) for gap, x in zip(gaps, predicted, strict=True))
 
@@ -91,26 +89,6 @@ def pressed(plant: Actuator, data: Measured) -> Pressed | None:
 
 def _level(gap: Array) -> Array:
     return np.asarray(gap - gap.mean())
-
-
-def held_user(shaft: Array, start: float, b: float) -> Array:
-    """θ_u behind a play in which it stays where it was pushed. [rad]"""
-    return np.asarray(_user(shaft, start, b, 1.0, 0.0, np.inf))
-
-
-@njit(cache=True, nogil=True)
-def _user(shaft: Array, start: float, b: float, side: float, centre: float, holds: float) -> Array:
-    """θ_u behind a play, from where it starts. [rad]"""
-    user = np.empty(len(shaft))
-    theta_u = start
-    for t in range(len(shaft)):
-        theta_u = follow(theta_u, shaft[t], b)
-        if shaft[t] - centre > holds:
-            theta_u = shaft[t] - side * b
-        elif shaft[t] - centre < -holds:
-            theta_u = shaft[t] + side * b
-        user[t] = theta_u
-    return user
 
 
 def _stiffness(plant: Actuator, data: Measured) -> float:

@@ -14,7 +14,7 @@ from ema.effects import registry
 
 from .candidates import Candidate, candidates
 from .features import Array
-from .fit import K_STEP
+from .free import K_STEP
 from .plant import EmaPlant
 
 K_USUAL = 0.05  # of a fault that is worth an alarm

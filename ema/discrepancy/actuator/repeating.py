@@ -6,8 +6,9 @@ from itertools import combinations
 
 import numpy as np
 
+from ema.discrepancy.plant import Point
+
 from .fit import residuals
-from .plant import Point
 from .search import FINAL_SEED, N_FINAL, Search
 
 SELDOM = 0.8  # share that repeats, below which that is worth a sentence; what always acts alike has 0.98 and more

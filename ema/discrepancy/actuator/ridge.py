@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ema.discrepancy.plant import Point
+
 from .candidates import Candidate
 from .fit import fit
-from .plant import Point
 from .screening import start_with
 from .search import Model, Search
 

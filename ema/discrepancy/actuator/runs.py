@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,7 +13,6 @@ from ema.models import parts
 
 from .features import Array
 
-Point = Mapping[str, float]
 MOST = 6_000  # runs that are remembered: some 100 MB
 
 

@@ -7,14 +7,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ema.discrepancy.plant import Point
 from ema.discrepancy.progress import Progress
 
 from .candidates import Candidate
 from .features import Array
-from .fit import K_FREE, N_SEEDS, SEED, Columns, Fit, Free, columns, fit, residuals, residuals_at, with_short_steps
+from .fit import N_SEEDS, SEED, Columns, Fit, columns, fit, residuals, residuals_at, with_short_steps
 from .flat import settled
+from .free import K_FREE, Free
 from .noise import Noise, Verdict, verdict
-from .plant import EmaPlant, Point, Steps
+from .plant import EmaPlant, Steps
 from .weak import Torque, torque
 
 N_FINAL = 16  # seeds of a mean that is judged
@@ -23,6 +25,7 @@ N_GLANCE, N_GLANCE_FAR = 4, 2  # seeds that tell a good start from a bad one; wh
 K_SEEN = 0.01  # a fault that is there
 CHANCE = 0.03  # difference in misfit that seeds make
 FAR = 100.0  # excess from which candidates are simulated before they are ranked
+DISTANT = 10.0  # excess of a model that is far from the data
 
 
 @dataclass

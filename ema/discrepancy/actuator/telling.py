@@ -11,6 +11,7 @@ from ema.core.names import FAULTS
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.engine.posterior import p_cause
 from ema.discrepancy.findings import WITHIN, Findings, FoundEffect, Gain, Quantity
+from ema.discrepancy.plant import Point
 from ema.effects import registry
 
 from . import controller, repeating
@@ -20,10 +21,10 @@ from .fit import SEED, Fit
 from .leave_out import over_folds, square
 from .noise import SEED as NOISE_SEED
 from .noise import Verdict
-from .plant import Point
 from .remains import Remains, remains
 from .search import CHANCE, FINAL_SEED, N_FINAL, Model, Search
 from .structure import structure
+from .verdicts import FAULT_ALARM
 from .weighing import WORTH_IT, is_enough
 
 IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
@@ -32,7 +33,6 @@ NAMED = 0.95  # share of what faults alone leave that effects must explain to be
 UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: a rest is left that nothing explains
 IN_LIBRARY = 0.99  # probability that what does it is in the library at all, where it leaves nothing
 LOUD, MOST = 1.3, 0.5  # misfit of a cycle that shows a rest; share of it that is worth a word
-FAULT_ALARM = 0.02  # a fault that an operator would be told of
 SEEDS = {"noise": NOISE_SEED, "fit": SEED, "held out": FINAL_SEED}  # the first of each
 OF_NATS = {"evidence": "the evidence of the record", "held-out cycles": "what held-out cycles say"}
 NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none

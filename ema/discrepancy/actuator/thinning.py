@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .cycles import Measured
+from .measured import Measured
 
 MOST = 24  # cycles that are examined; with more, the library's own approximations are what is left
 BY_CYCLE = ("motion", "start", "speed", "user_speed", "holding", "dT", "faults")

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ema.discrepancy.plant import Point
+
 from .fit import excess_at
 from .noise import Noise
-from .plant import EmaPlant, Point
+from .plant import EmaPlant
 
 TRIED = (-2, -1, 1, 2)  # samples
 CLEAR = 0.1  # share of what is left that a shift may leave; a sensor's delay, which looks alike, leaves more

@@ -8,10 +8,10 @@ import numpy as np
 
 from .comparators import CLEAR, PLAIN, find_step, take_step
 from .noise import N_RUNS_SURE, Noise, Verdict
-from .search import CHANCE, Model, Search
+from .search import CHANCE, DISTANT, Model, Search
 from .timing import samples_late
-from .weighing import DISTANT
 
+FAULT_ALARM = 0.02  # a fault that an operator would be told of
 PHASES = ("_a", "_b", "_c")
 NEARLY = 0.5  # excess of a model that may be the right one but for switching
 

@@ -6,12 +6,12 @@ from ema.effects import registry
 from ema.effects.base import ABSENT
 
 from .candidates import Candidate
-from .search import CHANCE, Model, Search
+from .search import CHANCE, DISTANT, Model, Search
 
+SAME = 0.05  # difference in held-out misfit up to which fewer causes are preferred
 WORTH_IT = 0.25  # share of what is left that a further effect must take on held-out cycles
 ENOUGH = 0.05  # share of what faults alone leave, from which effects explain it but for the form of their laws
 OWN_SHARE = 0.5  # of a gain that must go when the effect alone is switched off
-DISTANT = 10.0  # excess of a model that is far from the data
 ALIKE = 0.6  # share by which two models may leave more or less and be alike: laws are approximations
 DOUBTFUL = 2.0  # deviations from nothing, below which an effect is not named
 SLACK = 0.1  # misfit that switching noise may make

@@ -13,8 +13,7 @@ import numpy as np
 
 from ema.models.actuator import Actuator
 
-from .conditions import roughness
-from .features import Array, Signals
+from .features import Array, Signals, roughness
 
 CLOSED = 0.5  # [rad] of the rotor after it has turned round, from where the play is taken up
 STIFF = 1.5  # times the noise of θ_u that θ_m/GR - θ_u may vary by while the play is closed, with a stiff gear
