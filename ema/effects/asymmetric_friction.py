@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import SHARE, Effect, Parameter
+from .base import SHARE, Effect, Look, Parameter
 
 
 def factor(theta_m, w_m, theta_u, direction, tau_load, asymmetry):
@@ -23,4 +23,5 @@ EFFECT = Effect(
     mistaken_for=("k1",),
     plants=("ema", "axis"),
     limits={"asymmetry": SHARE},
+    looks=(Look("asymmetry"),),
 )

@@ -87,6 +87,31 @@ class Parameter:
     meaning: str
 
 
+class Look:
+    """A first look at an effect on a three-phase actuator: switched on by a known amount, for each linear parameter.
+
+    Parameters
+    ----------
+    linear : str
+        Parameters that the effect is (nearly) proportional to.
+    steps : mapping of str to float
+        Amount of each; where none is given, from its neutral value to its `start`.
+    at : mapping of str to float
+        Values of other parameters, from which a fit begins.
+    needs : str
+        What must be recorded for it to show: the ``supply``, or ``warming`` of the windings.
+    """
+
+    def __init__(
+        self,
+        *linear: str,
+        steps: Mapping[str, float] | None = None,
+        at: Mapping[str, float] | None = None,
+        needs: Literal["", "supply", "warming"] = "",
+    ) -> None:
+        self.linear, self.steps, self.at, self.needs = linear, dict(steps or {}), dict(at or {}), needs
+
+
 @dataclass(frozen=True)
 class Effect:
     """One physical term.
@@ -110,6 +135,8 @@ class Effect:
     place : str
         Where it acts: in the ``plant``, on a signal of the control ``loop``, or in the ``recorder`` alone, which the
         controller does not notice.
+    looks : tuple of Look
+        How a search looks for it on a three-phase actuator, if it need not be seen in the record first.
     """
 
     name: str
@@ -123,11 +150,15 @@ class Effect:
     limits: Mapping[str, Limit] = field(default_factory=dict)
     least_sd: Mapping[str, float] = field(default_factory=dict)
     place: Literal["plant", "loop", "recorder"] = "plant"
+    looks: tuple[Look, ...] = ()
 
     def __post_init__(self) -> None:
         unknown = set(self.laws) - set(HOOKS)
         if unknown:
             raise ValueError(f"effect {self.name}: unknown hooks {sorted(unknown)}; known: {sorted(HOOKS)}")
+        named = {name for look in self.looks for name in (*look.linear, *look.steps, *look.at)}
+        if strange := named - {p.name for p in self.parameters}:
+            raise ValueError(f"effect {self.name}: a look at {sorted(strange)}, which are none of its parameters")
 
     @property
     def is_table(self) -> bool:

@@ -6,7 +6,7 @@ t (1 + currents) + late.
 
 from __future__ import annotations
 
-from .base import SHARE, Effect, Parameter
+from .base import SHARE, Effect, Look, Parameter
 
 EFFECT = Effect(
     name="clock_skew",
@@ -28,4 +28,8 @@ EFFECT = Effect(
     plants=("ema", "axis"),
     limits={"rate": SHARE, "shared": SHARE, "currents": SHARE},
     place="recorder",
+    looks=(
+        Look("rate", steps={"rate": 1e-4}),
+        Look("shared", steps={"shared": 5e-4}),
+    ),
 )

@@ -5,7 +5,7 @@ Currents overshoot the hysteresis band by what they move in that time, 0.1 A/µs
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Look, Parameter
 
 EFFECT = Effect(
     name="comparator_delay",
@@ -17,4 +17,5 @@ EFFECT = Effect(
     mistaken_for=(),
     plants=("ema",),
     limits={"time": NOT_NEGATIVE},
+    looks=(Look("time"),),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import Effect, Look, Parameter
 
 
 def opposing(theta_u, torque):
@@ -18,4 +18,5 @@ EFFECT = Effect(
     laws={"user_torque": opposing},
     mistaken_for=("k1",),
     plants=("ema", "axis"),
+    looks=(Look("torque"),),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Look, Parameter
 
 EFFECT = Effect(
     name="controller_delay",
@@ -15,4 +15,5 @@ EFFECT = Effect(
     plants=("ema",),
     limits={"time": NOT_NEGATIVE},
     place="loop",
+    looks=(Look("time"),),
 )

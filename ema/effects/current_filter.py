@@ -5,7 +5,7 @@ What the controller sees is not filtered; only the record is.
 
 from __future__ import annotations
 
-from .base import ABSENT, NOT_REVERSED, Effect, Parameter
+from .base import ABSENT, NOT_REVERSED, Effect, Look, Parameter
 
 EFFECT = Effect(
     name="current_filter",
@@ -27,4 +27,5 @@ EFFECT = Effect(
     limits={"change": NOT_REVERSED},
     least_sd={"change": 3e-3},  # half a microsecond, of the comparators' grid, in 159 µs of both stages together
     place="recorder",
+    looks=(Look("change"),),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import Effect, Look, Parameter
 
 EFFECT = Effect(
     name="current_offset",
@@ -16,4 +16,5 @@ EFFECT = Effect(
     mistaken_for=("k1", "k3", "k4", "k5"),
     plants=("ema",),
     place="loop",
+    looks=(Look("offset_a", "offset_b", "offset_c"),),
 )

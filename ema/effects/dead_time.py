@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Look, Parameter
 
 EFFECT = Effect(
     name="dead_time",
@@ -12,4 +12,5 @@ EFFECT = Effect(
     mistaken_for=("k1",),
     plants=("ema",),
     limits={"time": NOT_NEGATIVE},
+    looks=(Look("time"),),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import SOME_LEFT, Effect, Parameter
+from .base import SOME_LEFT, Effect, Look, Parameter
 
 EFFECT = Effect(
     name="inertia",
@@ -12,4 +12,5 @@ EFFECT = Effect(
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema", "axis"),
     limits={"change": SOME_LEFT},
+    looks=(Look("change"),),
 )

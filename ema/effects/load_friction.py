@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Look, Parameter
 
 
 def factor(theta_m, w_m, theta_u, direction, tau_load, per_torque):
@@ -23,4 +23,5 @@ EFFECT = Effect(
     mistaken_for=("k1",),
     plants=("ema", "axis"),
     limits={"per_torque": NOT_NEGATIVE},
+    looks=(Look("per_torque"),),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import NOT_REVERSED, Effect, Parameter
+from .base import NOT_REVERSED, Effect, Look, Parameter
 
 
 def emf_factor(i_j, dT, change, per_kelvin):
@@ -31,4 +31,9 @@ EFFECT = Effect(
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema", "axis"),
     limits={"change": NOT_REVERSED},
+    looks=(
+        Look("change"),
+        Look("per_kelvin", needs="warming"),
+        Look("change", "per_kelvin", needs="warming"),
+    ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import Effect, Look, Parameter
 
 EFFECT = Effect(
     name="recorder_gain",
@@ -17,4 +17,5 @@ EFFECT = Effect(
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema",),
     place="recorder",
+    looks=(Look("gain_a", "gain_b", "gain_c", steps=dict.fromkeys(("gain_a", "gain_b", "gain_c"), 0.02)),),
 )

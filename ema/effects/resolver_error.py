@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import Effect, Look, Parameter
 from .vector_math import cos, sin
 
 
@@ -27,4 +27,5 @@ EFFECT = Effect(
     mistaken_for=("k6",),
     plants=("ema", "axis"),
     place="loop",
+    looks=(Look("once_cosine", "once_sine", "twice_cosine", "twice_sine"),),
 )

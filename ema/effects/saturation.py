@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Look, Parameter
 
 
 def emf_factor(i_j, dT, emf, inductance):
@@ -28,4 +28,5 @@ EFFECT = Effect(
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema", "axis"),
     limits={"emf": NOT_NEGATIVE, "inductance": NOT_NEGATIVE},
+    looks=(Look("emf", "inductance"),),
 )

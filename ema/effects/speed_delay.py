@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Look, Parameter
 
 EFFECT = Effect(
     name="speed_delay",
@@ -13,4 +13,5 @@ EFFECT = Effect(
     plants=("ema", "axis"),
     limits={"time": NOT_NEGATIVE},
     place="loop",
+    looks=(Look("time"),),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import NOT_REVERSED, POSITIVE, Effect, Parameter
+from .base import NOT_REVERSED, POSITIVE, Effect, Look, Parameter
 from .vector_math import exp_negative
 
 
@@ -27,4 +27,5 @@ EFFECT = Effect(
     mistaken_for=("k1",),
     plants=("ema", "axis"),
     limits={"excess": NOT_REVERSED, "speed": POSITIVE},
+    looks=tuple(Look("excess", at={"speed": speed, "shape": 0.5}) for speed in (4.0, 15.0, 40.0)),
 )

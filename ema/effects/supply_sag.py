@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from .base import NOT_NEGATIVE, Effect, Parameter
+from .base import NOT_NEGATIVE, Effect, Look, Parameter
 
 
 @njit(inline="always")
@@ -42,4 +42,5 @@ EFFECT = Effect(
     separated_by="record of the bus voltage; a motion fast enough to reach the voltage limit",
     plants=("ema", "axis"),
     limits={"resistance": NOT_NEGATIVE, "capacitance": NOT_NEGATIVE},
+    looks=(Look("resistance", at={"capacitance": 5e-3}, needs="supply"),),
 )

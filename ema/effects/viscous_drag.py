@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import Effect, Parameter
+from .base import Effect, Look, Parameter
 
 
 def torque(theta_m, w_m, theta_u, i_q, coefficient):
@@ -22,4 +22,5 @@ EFFECT = Effect(
     laws={"shaft_torque": torque},
     mistaken_for=("k1",),
     plants=("ema", "axis"),
+    looks=(Look("coefficient"),),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import NOT_REVERSED, Effect, Parameter
+from .base import NOT_REVERSED, Effect, Look, Parameter
 
 
 def factor(dT, change, per_kelvin):
@@ -22,4 +22,9 @@ EFFECT = Effect(
     laws={"resistance_factor": factor},
     plants=("ema", "axis"),
     limits={"change": NOT_REVERSED},
+    looks=(
+        Look("change"),
+        Look("per_kelvin", needs="warming"),
+        Look("change", "per_kelvin", needs="warming"),
+    ),
 )

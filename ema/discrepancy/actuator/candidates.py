@@ -222,45 +222,20 @@ def candidates(
     line: str = "cogging",
     gear: Resonance | None = None,
 ) -> list[Candidate]:
-    """What to try on these cycles; nonlinear parameters where the residual torque suggests them.
+    """What to try on these cycles: what effects declare, and what the record or the residual torque suggests.
 
     A torque line is tried as the effect `line`: the first is cogging, a further one stands beside it. `gear` is the
     resonance that rotor and user show.
     """
+    shown = {"", *(["supply"] if all(s.u_dc is not None for s in data.signals) else [])}
+    shown |= {"warming"} if np.ptp(data.dT) > WARMER else set()
     found = [
-        _plain("asymmetric_friction", "asymmetry"),
-        _plain("clock_skew", "rate", step={"rate": 1e-4}),
-        _plain("clock_skew", "shared", step={"shared": 5e-4}),
-        _commutation(plant, data.zero),
-        _plain("comparator_delay", "time"),
-        _plain("constant_load", "torque"),
-        _plain("current_filter", "change"),
-        _without_filter(),
-        _plain("current_gain", "gain_a", "gain_b", "gain_c", step=dict.fromkeys(("gain_a", "gain_b", "gain_c"), 0.02)),
-        _plain("current_offset", "offset_a", "offset_b", "offset_c"),
-        _plain("controller_delay", "time"),
-        _plain("dead_time", "time"),
-        _plain("inertia", "change"),
-        _plain("load_friction", "per_torque"),
-        _plain("magnet_flux", "change"),
-        _plain("position_delay", "time"),
-        _plain("quadratic_drag", "coefficient"),
-        _plain("recorder_delay", "time"),
-        _plain("recorder_gain", "gain_a", "gain_b", "gain_c", step=dict.fromkeys(("gain_a", "gain_b", "gain_c"), 0.02)),
-        _plain("recorder_offset", "offset_a", "offset_b", "offset_c"),
-        _plain("resolver_error", "once_cosine", "once_sine", "twice_cosine", "twice_sine"),
-        _plain("saturation", "emf", "inductance"),
-        _plain("speed_delay", "time"),
-        _plain("spring_load", "stiffness"),
-        *(_plain("stribeck", "excess", speed=speed, shape=0.5) for speed in (4.0, 15.0, 40.0)),
-        _plain("viscous_drag", "coefficient"),
-        _plain("winding_resistance", "change"),
+        _plain(effect.name, *look.linear, step=look.steps, **look.at)
+        for effect in registry().values()
+        for look in effect.looks
+        if look.needs in shown
     ]
-    if all(s.u_dc is not None for s in data.signals):
-        found.append(_plain("supply_sag", "resistance", capacitance=5e-3))
-    if np.ptp(data.dT) > WARMER:
-        for effect in ("magnet_flux", "winding_resistance"):
-            found += [_plain(effect, "per_kelvin"), _plain(effect, "change", "per_kelvin")]
+    found += [_commutation(plant, data.zero), _without_filter()]
     top = max(float(np.abs(s.i).max()) for s in data.signals)
     if any(int((np.abs(s.i) > top - FLAT).sum()) >= FLAT_SAMPLES for s in data.signals):
         limit = Free("adc_saturation.limit", 0.5 * top, plant.sensors.adc_range, CLIPPED_STEP)
