@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from .base import SHARE, Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import SHARE, Effect, Parameter
+from .search import AxisSizes, Look, Span
 
 
 def factor(theta_m, w_m, theta_u, direction, tau_load, asymmetry):
     """F × (1 + a sign ω_m)"""
     return 1.0 + asymmetry * direction
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span]:
+    """Where a search begins, by what the records hold."""
+    return {"asymmetry": Span(-0.95, 0.95, (0.1,), 0.05)}
 
 
 EFFECT = Effect(
@@ -24,4 +32,5 @@ EFFECT = Effect(
     plants=("ema", "axis"),
     limits={"asymmetry": SHARE},
     looks=(Look("asymmetry"),),
+    on_axis=on_axis,
 )

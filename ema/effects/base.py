@@ -35,6 +35,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
+from .search import Look, OnAxis
+
 HOOKS = MappingProxyType(
     {
         "shaft_torque": ("sum", 4),
@@ -87,31 +89,6 @@ class Parameter:
     meaning: str
 
 
-class Look:
-    """A first look at an effect on a three-phase actuator: switched on by a known amount, for each linear parameter.
-
-    Parameters
-    ----------
-    linear : str
-        Parameters that the effect is (nearly) proportional to.
-    steps : mapping of str to float
-        Amount of each; where none is given, from its neutral value to its `start`.
-    at : mapping of str to float
-        Values of other parameters, from which a fit begins.
-    needs : str
-        What must be recorded for it to show: the ``supply``, or ``warming`` of the windings.
-    """
-
-    def __init__(
-        self,
-        *linear: str,
-        steps: Mapping[str, float] | None = None,
-        at: Mapping[str, float] | None = None,
-        needs: Literal["", "supply", "warming"] = "",
-    ) -> None:
-        self.linear, self.steps, self.at, self.needs = linear, dict(steps or {}), dict(at or {}), needs
-
-
 @dataclass(frozen=True)
 class Effect:
     """One physical term.
@@ -137,6 +114,8 @@ class Effect:
         controller does not notice.
     looks : tuple of Look
         How a search looks for it on a three-phase actuator, if it need not be seen in the record first.
+    on_axis : function AxisSizes → spans of parameters, optional
+        Where a search looks for it on an axis, if it need not be seen in the balance of torque first.
     """
 
     name: str
@@ -151,6 +130,7 @@ class Effect:
     least_sd: Mapping[str, float] = field(default_factory=dict)
     place: Literal["plant", "loop", "recorder"] = "plant"
     looks: tuple[Look, ...] = ()
+    on_axis: OnAxis | None = None
 
     def __post_init__(self) -> None:
         unknown = set(self.laws) - set(HOOKS)

@@ -6,7 +6,16 @@ t (1 + currents) + late.
 
 from __future__ import annotations
 
-from .base import SHARE, Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import SHARE, Effect, Parameter
+from .search import AxisSizes, Look, Span
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span]:
+    """Where a search begins, by what the records hold."""
+    return {"rate": Span(-0.05, 0.05, (0.002,), 0.002)}
+
 
 EFFECT = Effect(
     name="clock_skew",
@@ -32,4 +41,5 @@ EFFECT = Effect(
         Look("rate", steps={"rate": 1e-4}),
         Look("shared", steps={"shared": 5e-4}),
     ),
+    on_axis=on_axis,
 )

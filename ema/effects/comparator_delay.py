@@ -5,7 +5,8 @@ Currents overshoot the hysteresis band by what they move in that time, 0.1 A/µs
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Look, Parameter
+from .base import NOT_NEGATIVE, Effect, Parameter
+from .search import Look
 
 EFFECT = Effect(
     name="comparator_delay",

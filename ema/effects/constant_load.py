@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from .base import Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import Effect, Parameter
+from .search import AxisSizes, Look, Span
 
 
 def opposing(theta_u, torque):
     """τ_u = T   [N m]"""
     return torque
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span]:
+    """Where a search begins, by what the records hold."""
+    return {"torque": Span(-3.0 * s.torque, 3.0 * s.torque, (0.02 * s.torque,), 0.02 * s.torque)}
 
 
 EFFECT = Effect(
@@ -19,4 +27,5 @@ EFFECT = Effect(
     mistaken_for=("k1",),
     plants=("ema", "axis"),
     looks=(Look("torque"),),
+    on_axis=on_axis,
 )

@@ -5,7 +5,8 @@ What the controller sees is not filtered; only the record is.
 
 from __future__ import annotations
 
-from .base import ABSENT, NOT_REVERSED, Effect, Look, Parameter
+from .base import ABSENT, NOT_REVERSED, Effect, Parameter
+from .search import Look
 
 EFFECT = Effect(
     name="current_filter",

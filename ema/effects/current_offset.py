@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .base import Effect, Look, Parameter
+from .base import Effect, Parameter
+from .search import Look
 
 EFFECT = Effect(
     name="current_offset",

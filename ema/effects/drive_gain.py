@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from .base import Effect, Parameter
+from .search import AxisSizes, Span
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Where a search begins, by what the records hold."""
+    return None if s.driven_by == "speed-loop" else {"gain": Span(-0.5, 1.0, (0.02,), 0.02)}
+
 
 EFFECT = Effect(
     name="drive_gain",
@@ -12,4 +21,5 @@ EFFECT = Effect(
     mistaken_for=("k1",),
     plants=("axis",),
     place="recorder",
+    on_axis=on_axis,
 )

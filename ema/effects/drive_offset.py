@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from .base import Effect, Parameter
+from .search import AxisSizes, Span
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Where a search begins, by what the records hold."""
+    if s.driven_by == "speed-loop":
+        return None
+    return {"offset": Span(-3.0 * s.drive, 3.0 * s.drive, (0.02 * s.drive,), 0.02 * s.drive)}
+
 
 EFFECT = Effect(
     name="drive_offset",
@@ -12,4 +23,5 @@ EFFECT = Effect(
     mistaken_for=("k1",),
     plants=("axis",),
     place="recorder",
+    on_axis=on_axis,
 )

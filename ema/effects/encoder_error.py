@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from .base import Effect
 from .resolver_error import EFFECT as RESOLVER
 from .resolver_error import error
+from .search import AxisSizes, Span
+
+PARTS = ("once_cosine", "once_sine", "twice_cosine", "twice_sine")
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Where a search begins, by what the records hold."""
+    if not s.turns or not {"theta_m", "w_m"} <= s.outputs:
+        return None
+    return dict.fromkeys(PARTS, Span(-0.2, 0.2, (1e-3,), 0.01))
+
 
 EFFECT = Effect(
     name="encoder_error",
@@ -15,4 +28,5 @@ EFFECT = Effect(
     laws={"position_error": error},
     plants=("axis",),
     place="recorder",
+    on_axis=on_axis,
 )

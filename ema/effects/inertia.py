@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from .base import SOME_LEFT, Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import SOME_LEFT, Effect, Parameter
+from .search import AxisSizes, Look, Span
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Where a search begins, by what the records hold."""
+    if {"J", "M"} & s.fitted or not s.moves:
+        return None
+    return {"change": Span(-0.8, 4.0, (0.02,), 0.03)}
+
 
 EFFECT = Effect(
     name="inertia",
@@ -13,4 +24,5 @@ EFFECT = Effect(
     plants=("ema", "axis"),
     limits={"change": SOME_LEFT},
     looks=(Look("change"),),
+    on_axis=on_axis,
 )

@@ -7,10 +7,12 @@ the mean current there, in proportion for a triangular ripple; capacitances of t
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from numba import njit
 
 from .base import NOT_NEGATIVE, Effect, Parameter
+from .search import AxisSizes, Span
 
 
 @njit(inline="always")
@@ -19,6 +21,17 @@ def drop(i, voltage, below, roundness):
     x = i / max(below, 1e-6)
     corner = min(max(x, -1.0), 1.0)
     return voltage * (corner + roundness * (math.tanh(x) - corner))
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Where a search begins, by what the records hold."""
+    if not s.shows_voltage:
+        return None
+    return {
+        "voltage": Span(0.0, 0.5 * s.voltage, (0.02 * s.voltage,), 0.01 * s.voltage),
+        "below": Span(0.0, s.current, (0.01 * s.current, 0.2 * s.current), 0.05 * s.current),
+        "roundness": Span(0.0, 1.0, (0.5,), 0.5),
+    }
 
 
 EFFECT = Effect(
@@ -33,4 +46,5 @@ EFFECT = Effect(
     separated_by="voltage at the motor's terminals; standstill at several small currents",
     plants=("axis",),
     limits={"below": NOT_NEGATIVE},
+    on_axis=on_axis,
 )

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import NOT_NEGATIVE, Effect, Parameter
+from .search import AxisSizes, Look, Span
 
 
 def factor(theta_m, w_m, theta_u, direction, tau_load, per_torque):
     """F × (1 + c |τ_load|)"""
     return 1.0 + per_torque * abs(tau_load)
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span]:
+    """Where a search begins, by what the records hold."""
+    return {"per_torque": Span(0.0, 20.0 / s.torque, (0.2 / s.torque,), 0.1 / s.torque)}
 
 
 EFFECT = Effect(
@@ -24,4 +32,5 @@ EFFECT = Effect(
     plants=("ema", "axis"),
     limits={"per_torque": NOT_NEGATIVE},
     looks=(Look("per_torque"),),
+    on_axis=on_axis,
 )

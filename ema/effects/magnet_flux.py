@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from .base import NOT_REVERSED, Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import NOT_REVERSED, Effect, Parameter
+from .search import AxisSizes, Look, Span
 
 
 def emf_factor(i_j, dT, change, per_kelvin):
     """κ × (1 + δ + α ΔT)"""
     return 1.0 + change + per_kelvin * dT
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Where a search begins, by what the records hold."""
+    if s.is_force:
+        return None
+    change = {"change": Span(-0.4, 0.4, (-0.02,), 0.02)}
+    return {**change, "per_kelvin": Span(-0.004, 0.002, (-0.001,), 0.0005)} if s.warms else change
 
 
 EFFECT = Effect(
@@ -36,4 +47,5 @@ EFFECT = Effect(
         Look("per_kelvin", needs="warming"),
         Look("change", "per_kelvin", needs="warming"),
     ),
+    on_axis=on_axis,
 )

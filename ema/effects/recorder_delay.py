@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Look, Parameter
+from .base import NOT_NEGATIVE, Effect, Parameter
+from .search import Look
 
 EFFECT = Effect(
     name="recorder_delay",

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from .base import Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import Effect, Parameter
+from .search import AxisSizes, Look, Span
 from .vector_math import cos, sin
 
 
@@ -10,6 +13,14 @@ def error(theta_m, once_cosine, once_sine, twice_cosine, twice_sine):
     """Δθ = c₁ cos θ_m + s₁ sin θ_m + c₂ cos 2θ_m + s₂ sin 2θ_m   [rad]"""
     c, s = cos(theta_m), sin(theta_m)
     return once_cosine * c + once_sine * s + twice_cosine * (c * c - s * s) + twice_sine * (2.0 * s * c)
+
+
+PARTS = ("once_cosine", "once_sine", "twice_cosine", "twice_sine")
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Where a search begins, by what the records hold."""
+    return dict.fromkeys(PARTS, Span(-0.2, 0.2, (1e-3,), 0.01)) if s.turns else None
 
 
 EFFECT = Effect(
@@ -28,4 +39,5 @@ EFFECT = Effect(
     plants=("ema", "axis"),
     place="loop",
     looks=(Look("once_cosine", "once_sine", "twice_cosine", "twice_sine"),),
+    on_axis=on_axis,
 )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import NOT_NEGATIVE, Effect, Parameter
+from .search import AxisSizes, Look, Span
 
 
 def emf_factor(i_j, dT, emf, inductance):
@@ -13,6 +16,13 @@ def emf_factor(i_j, dT, emf, inductance):
 def inductance_factor(i_j, emf, inductance):
     """L × 1 / (1 + γ i²)"""
     return 1.0 / (1.0 + inductance * i_j * i_j)
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Where a search begins, by what the records hold."""
+    if s.is_force:
+        return None
+    return {"emf": Span(0.0, 0.3 / s.current**2, (0.03 / s.current**2,), 0.02 / s.current**2)}
 
 
 EFFECT = Effect(
@@ -29,4 +39,5 @@ EFFECT = Effect(
     plants=("ema", "axis"),
     limits={"emf": NOT_NEGATIVE, "inductance": NOT_NEGATIVE},
     looks=(Look("emf", "inductance"),),
+    on_axis=on_axis,
 )

@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import NOT_NEGATIVE, Effect, Parameter
+from .search import AxisSizes, Look, Span
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Where a search begins, by what the records hold."""
+    if not {"w_m", "v"} & s.outputs:
+        return None
+    return {"time": Span(0.0, 20.0 * s.period, (0.3 * s.period, 3.0 * s.period), 0.3 * s.period)}
+
 
 EFFECT = Effect(
     name="speed_delay",
@@ -14,4 +25,5 @@ EFFECT = Effect(
     limits={"time": NOT_NEGATIVE},
     place="loop",
     looks=(Look("time"),),
+    on_axis=on_axis,
 )

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from .base import Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import Effect, Parameter
+from .search import AxisSizes, Look, Span
 
 
 def opposing(theta_u, stiffness):
     """τ_u = K θ_u   [N m]"""
     return stiffness * theta_u
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span]:
+    """Where a search begins, by what the records hold."""
+    k = s.torque / s.half_range  # near a resonance it moves farther than the drive could hold it
+    return {"stiffness": Span(-50.0 * k, 50.0 * k, (0.05 * k, 2.0 * k), 0.05 * k)}
 
 
 EFFECT = Effect(
@@ -19,4 +28,5 @@ EFFECT = Effect(
     mistaken_for=("k1",),
     plants=("ema", "axis"),
     looks=(Look("stiffness"),),
+    on_axis=on_axis,
 )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .base import NOT_REVERSED, POSITIVE, Effect, Look, Parameter
+from .base import NOT_REVERSED, POSITIVE, Effect, Parameter
+from .search import Look
 from .vector_math import exp_negative
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from numba import njit
 
-from .base import NOT_NEGATIVE, Effect, Look, Parameter
+from .base import NOT_NEGATIVE, Effect, Parameter
+from .search import AxisSizes, Look, Span
 
 
 @njit(inline="always")
@@ -31,6 +34,14 @@ def commanded(u, i, resistance, U):
     return 2.0 * u / (1.0 + max(1.0 - 4.0 * resistance * u * i / (U * U), 0.0) ** 0.5)
 
 
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Where a search begins, by what the records hold."""
+    if s.supply is None or not s.shows_voltage:
+        return None
+    R = s.supply**2 / (s.voltage * s.current)  # at which nothing would be left of the supply
+    return {"resistance": Span(0.0, 0.2 * R, (0.01 * R,), 0.01 * R)}
+
+
 EFFECT = Effect(
     name="supply_sag",
     parameters=(
@@ -43,4 +54,5 @@ EFFECT = Effect(
     plants=("ema", "axis"),
     limits={"resistance": NOT_NEGATIVE, "capacitance": NOT_NEGATIVE},
     looks=(Look("resistance", at={"capacitance": 5e-3}, needs="supply"),),
+    on_axis=on_axis,
 )

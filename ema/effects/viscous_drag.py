@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from .base import Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import Effect, Parameter
+from .search import AxisSizes, Look, Span
 
 
 def torque(theta_m, w_m, theta_u, i_q, coefficient):
     """τ = c ω_m   [N m]"""
     return coefficient * w_m
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span]:
+    """Where a search begins, by what the records hold."""
+    c = s.torque / s.speed
+    return {"coefficient": Span(-s.damping, 3.0 * c, (0.05 * c,), 0.05 * c)}
 
 
 EFFECT = Effect(
@@ -23,4 +32,5 @@ EFFECT = Effect(
     mistaken_for=("k1",),
     plants=("ema", "axis"),
     looks=(Look("coefficient"),),
+    on_axis=on_axis,
 )

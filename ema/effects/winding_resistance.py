@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from .base import NOT_REVERSED, Effect, Look, Parameter
+from collections.abc import Mapping
+
+from .base import NOT_REVERSED, Effect, Parameter
+from .search import AxisSizes, Look, Span
 
 
 def factor(dT, change, per_kelvin):
     """R × (1 + δ + α ΔT)"""
     return 1.0 + change + per_kelvin * dT
+
+
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Where a search begins, by what the records hold."""
+    if not s.shows_voltage or "R" in s.fitted:
+        return None
+    change = {"change": Span(-0.6, 2.0, (0.05,), 0.05)}
+    return {**change, "per_kelvin": Span(0.0, 0.008, (0.0039,), 0.001)} if s.warms else change
 
 
 EFFECT = Effect(
@@ -27,4 +38,5 @@ EFFECT = Effect(
         Look("per_kelvin", needs="warming"),
         Look("change", "per_kelvin", needs="warming"),
     ),
+    on_axis=on_axis,
 )

@@ -21,8 +21,9 @@ from ema.effects.stribeck import factor
 from .weak_form import FEWEST, Weak, thinned, weak_form
 
 if TYPE_CHECKING:
+    from ema.effects.search import AxisSizes
+
     from .measured import Measured
-    from .sizes import Sizes
 
 NAME = "stribeck"
 SPEEDS = np.geomspace(0.02, 1.0, 12)  # of the rms speed
@@ -76,7 +77,7 @@ def fadings(weak: Weak, beside: Sequence[Array], speeds: Array) -> list[Fading]:
     return sorted(found, key=lambda f: f.left)
 
 
-def fading_candidate(plant: Measured, s: Sizes, point: Point, blocks: Sequence[int]) -> Candidate | None:
+def fading_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Sequence[int]) -> Candidate | None:
     """The likeliest speeds and shapes as starts, each with friction and inertia as they are beside it."""
     if any(name.startswith(f"{NAME}.") for name in point):
         return None

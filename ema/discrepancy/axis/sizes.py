@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from ema.effects.search import AxisSizes
+from ema.models.axis_config import LinearAxis
 
 if TYPE_CHECKING:
     from .measured import Measured
 
 
-@dataclass(frozen=True)
-class Sizes:
-    """Typical sizes in the records: rms of drive torque, speed, drive, voltage; extent of position; sample period."""
-
-    torque: float
-    speed: float
-    drive: float
-    current: float
-    voltage: float
-    centre: float
-    half_range: float
-    period: float
+WARMING = 5.0  # [K] by which windings must change temperature to show what it does
 
 
-def sizes(plant: Measured) -> Sizes:
-    """Sizes over all records; the largest where records differ."""
+def sizes(plant: Measured) -> AxisSizes:
+    """AxisSizes over all records; the largest where records differ."""
     p = plant.plant
     moving = [w for w in plant.windows if not w.static] or list(plant.windows)
     drive = _rms(np.concatenate([w.drive for w in plant.windows]))
@@ -48,8 +39,25 @@ def sizes(plant: Measured) -> Sizes:
     torque = drive if p.is_force else k_t * current
     position = np.concatenate([w.position for w in moving])
     low, high = float(position.min()), float(position.max())
-    period = max((w.period for w in moving if not w.static), default=1e-3)
-    return Sizes(torque, speed, drive, current, voltage, 0.5 * (low + high), max(0.5 * (high - low), 1e-12), period)
+    return AxisSizes(
+        torque=torque,
+        speed=speed,
+        drive=drive,
+        current=current,
+        voltage=voltage,
+        centre=0.5 * (low + high),
+        half_range=max(0.5 * (high - low), 1e-12),
+        period=max((w.period for w in moving if not w.static), default=1e-3),
+        damping=p.C,
+        supply=p.V_dc,
+        driven_by=p.drive,
+        outputs=frozenset(name for b in plant.benches for name in b.roles.outputs),
+        fitted=frozenset(p.fitted),
+        turns=not isinstance(p, LinearAxis),
+        moves=any(not w.static for w in plant.windows),
+        warms=bool(np.ptp([w.dT for w in plant.windows]) > WARMING),
+        is_force=p.is_force,
+    )
 
 
 def _rms(x: np.ndarray) -> float:

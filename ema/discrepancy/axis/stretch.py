@@ -14,8 +14,9 @@ from ema.effects import registry
 from .weak_form import FEWEST, thinned, weak_form
 
 if TYPE_CHECKING:
+    from ema.effects.search import AxisSizes
+
     from .measured import Measured
-    from .sizes import Sizes
 
 NAME = "position_friction"
 WIDTHS = np.geomspace(0.01, 0.6, 8)  # of half the travel
@@ -23,7 +24,7 @@ SPACING = 0.7  # of centres, in widths
 LEAST = 1e-3  # of a column that must be left beside friction, drag and inertia
 
 
-def stretch_candidate(plant: Measured, s: Sizes, point: Point, blocks: Sequence[int]) -> Candidate | None:
+def stretch_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Sequence[int]) -> Candidate | None:
     """For each width the likeliest place as a start; None where the effect is in the model already."""
     if any(name.startswith(NAME) for name in point):
         return None

@@ -14,9 +14,10 @@ import numpy as np
 
 from ema.core.records import Array
 from ema.discrepancy.plant import Candidate, Free, Point
+from ema.effects.search import AxisSizes
 from ema.effects.torque_term import COLUMNS, EVEN, NEUTRAL
 
-from .sizes import Sizes, sizes
+from .sizes import sizes
 from .weak_form import FEWEST, Motion, Weak, thinned, weak_form
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def search(plant: Measured, point: Point, blocks: Sequence[int]) -> list[Candida
     return [_candidate(f"term{number}", term, c, plant) for _, term, c in ranked[:N_SUGGESTIONS]]
 
 
-def _families(m: Motion, s: Sizes, own: float) -> dict[str, list[Term]]:
+def _families(m: Motion, s: AxisSizes, own: float) -> dict[str, list[Term]]:
     out: dict[str, list[Term]] = {}
     for term in _dictionary(m, s, own):
         out.setdefault(term.family, []).append(term)
@@ -81,7 +82,7 @@ def _norms(columns: Array) -> Array:
     return np.asarray(np.linalg.norm(columns, axis=0))
 
 
-def _dictionary(m: Motion, s: Sizes, own: float) -> Iterator[Term]:
+def _dictionary(m: Motion, s: AxisSizes, own: float) -> Iterator[Term]:
     sign, one = np.sign(m.direction), np.ones(len(m.theta))
     span = float(np.ptp(m.theta))
     duration = float(np.ptp(m.t))
