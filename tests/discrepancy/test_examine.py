@@ -1,0 +1,178 @@
+"""The examination on toy plants, which are linear and known to the last digit: milliseconds each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from ema.discrepancy.examine import examine
+from ema.discrepancy.fitting import best_fit, fit, jacobian
+from ema.discrepancy.held_out import by_record, over_folds, residual_over_folds, training_gain
+from ema.discrepancy.plant import Block, Candidate, Errors, Free
+from ema.discrepancy.progress import Progress
+from ema.discrepancy.rounds import State, leave_out, select
+from ema.discrepancy.selection import base_model, folds, one_more
+from ema.discrepancy.trust import at_bound, told_effects, without_unlikely
+from ema.discrepancy.verdict import correlation_test, judge, scale_test
+
+N_BLOCKS, N = 12, 120
+QUIET = 1.0  # noise of a whitened residual
+
+
+class Toy:
+    """Residuals are noise and columns: one of the base parameter `k`, and one for each effect.
+
+    `hidden` are sizes of effects that act; `others` columns that act and that no candidate has.
+    """
+
+    noise_uncertainty = 0.0
+
+    def __init__(
+        self, seed: int, effects: Sequence[str] = ("a", "b"), others: float = 0.0, k: float = 0.0, **hidden: float
+    ):
+        rng = np.random.default_rng(seed)
+        self.blocks = [Block(f"part {j}", "record", N, stretch=j) for j in range(N_BLOCKS)]
+        self.columns = {name: rng.standard_normal((N_BLOCKS, 1, N)) for name in ("k", *effects)}
+        y = QUIET * rng.standard_normal((N_BLOCKS, 1, N)) + others * rng.standard_normal((1, 1, N)).cumsum(axis=2)
+        self.y = y + sum(size * self.columns[name] for name, size in {"k": k, **hidden}.items())
+        self.base = [Free("k", "1", -1.0, 1.0, 0.0, 0.1)]
+        self.effects = effects
+
+    def residuals(self, points, blocks):
+        return [
+            [self.y[j] - sum(v * self.columns[n.removesuffix(".size")][j] for n, v in p.items()) for j in blocks]
+            for p in points
+        ]
+
+    def candidates(self, point, blocks):
+        return [
+            Candidate(n, n, (Free(f"{n}.size", "N m", -5.0, 5.0, 0.1, 0.1),), ({f"{n}.size": 0.1},), {f"{n}.size": 0.0})
+            for n in self.effects
+            if f"{n}.size" not in point
+        ]
+
+    def structure(self, point, blocks):
+        return []
+
+    def errors(self, point, blocks):
+        r = np.concatenate([x.ravel() for x in self.residuals([point], blocks)[0]])
+        return Errors(float(np.sqrt(np.mean(r**2))), QUIET, float(len(r)))
+
+    def describe(self, candidates, point, draw):
+        drawn = draw(50)
+        return [
+            {"key": c.key, "name": c.effect, "parameters": {f.name: [p[f.name] for p in drawn] for f in c.free}}
+            for c in candidates
+        ]
+
+    def describe_structure(self, terms, point):
+        return {}
+
+
+def test_of_forty_toys_with_nothing_hidden_none_has_an_effect():
+    for seed in range(40):
+        outcome = examine(Toy(seed, k=0.3))
+        assert outcome.verdict == "adequate", seed
+        assert outcome.effects == []
+        assert outcome.k_after[0] == pytest.approx(0.3, abs=5.0 * outcome.k_error[0])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_hidden_effect_is_named_with_its_size_and_what_is_gained(seed):
+    outcome = examine(Toy(seed, ("a", "b", "c"), k=-0.2, b=0.8))
+    (found,) = outcome.effects
+    assert found["name"] == "b"
+    assert found["indistinguishable_from"] == []
+    assert found["confidence"] > 0.9
+    assert np.mean(found["parameters"]["b.size"]) == pytest.approx(0.8, abs=0.1)
+    assert outcome.verdict == "explained"
+    assert outcome.heldout.err_after < 1.1 < outcome.heldout.err_before
+    assert outcome.train.err_after < outcome.train.err_before
+
+
+def test_two_effects_with_one_column_cannot_be_told_apart():
+    toy = Toy(1, ("a", "b"), a=0.8)
+    toy.columns["b"] = toy.columns["a"] + 1e-6 * toy.columns["b"]
+    (found,) = examine(toy).effects
+    assert {found["name"], *found["indistinguishable_from"]} == {"a", "b"}
+    assert found["confidence"] < 0.6
+
+
+def test_what_no_effect_can_do_is_unexplained():
+    outcome = examine(Toy(3, others=0.5))
+    assert outcome.verdict == "unexplained"
+    assert outcome.effects == []
+
+
+def test_an_effect_that_a_later_one_makes_superfluous_is_left_out():
+    toy = Toy(4, ("a", "b"), b=0.8)
+    plain = base_model(toy)
+    trials = one_more(toy, plain, toy.candidates, str)
+    both = one_more(toy, trials["a"], toy.candidates, str)["b"]
+    assert [c.key for c in both.accepted] == ["a", "b"]
+    assert [c.key for c in leave_out(toy, both, {0}).accepted] == ["b"]
+    progress = Progress()
+    state = State(plain, plain, [], [])
+    select(toy, state, progress)
+    assert [c.key for c in state.model.accepted] == ["b"]
+    assert without_unlikely(toy, state, progress)["b"] > 0.9
+    final = fit(toy, [*toy.base, *state.model.accepted[0].free], state.model.fits[0].point, range(N_BLOCKS))
+    (told,) = told_effects(toy, state, {"b": 1.0}, final.point, final.draw)
+    assert told["name"] == "b"
+
+
+def test_fits_are_least_squares_within_bounds():
+    toy = Toy(5, ("a",), a=0.7, k=0.4)
+    blocks = range(N_BLOCKS)
+    free = [*toy.base, *toy.candidates({}, blocks)[0].free]
+    found = fit(toy, free, {"k": 0.0, "a.size": 0.1}, blocks)
+    A = np.stack([toy.columns[n].ravel() for n in ("k", "a")], axis=1)
+    exact, *_ = np.linalg.lstsq(A, toy.y.ravel(), rcond=None)
+    assert [found.point["k"], found.point["a.size"]] == pytest.approx(exact, abs=0.02)  # Huber's weights
+    assert jacobian(toy, free, found.point, blocks) == pytest.approx(-A, abs=1e-6)
+    sd = np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx(sd, rel=0.1)
+    low = [Free("k", "1", 0.5, 1.0, 0.5, 0.1), free[1]]
+    held = best_fit(toy, low, [{"k": 0.6, "a.size": x} for x in (0.1, 1.0, 2.0)], blocks)
+    assert held.point["k"] == 0.5
+    assert at_bound(Free("k", "1", 0.5, 1.0, 0.5, 0.1), held.point["k"])
+    assert not at_bound(Free("k", "1", 0.0, 1.0, 0.5, 0.1), 0.0)  # off
+
+
+def test_what_is_known_beforehand_counts_as_a_measurement():
+    toy = Toy(6, (), k=0.8)
+    A, y = toy.columns["k"].ravel(), toy.y.ravel()
+    sd = float(1.0 / np.linalg.norm(A))  # as sure as the records are
+    found = fit(toy, [Free("k", "1", -1.0, 1.0, 0.0, 0.1, prior=sd)], {"k": 0.0}, range(N_BLOCKS))
+    assert found.point["k"] == pytest.approx(0.5 * (A @ y) / (A @ A), rel=0.05)
+
+
+def test_gains_are_of_parts_that_were_not_fitted():
+    toy = Toy(7, ("a",), a=1.0)
+    plain = base_model(toy)
+    with_a = one_more(toy, plain, toy.candidates, str)["a"]
+    of = folds(toy.blocks)
+    assert sorted(j for out in of for j in out) == list(range(N_BLOCKS))
+    gain = over_folds(toy, plain, with_a)
+    assert gain.err_before == pytest.approx(np.sqrt(2.0), rel=0.1)
+    assert gain.err_after == pytest.approx(1.0, rel=0.05)
+    assert residual_over_folds(toy, plain, with_a).err_after == pytest.approx(with_a.rms, rel=0.02)
+    (record,) = by_record(toy, plain, with_a)
+    assert record.err_after < record.err_before
+    assert training_gain(toy, plain, with_a).err_after <= gain.err_after * 1.02
+
+
+def test_noise_is_told_from_what_is_larger_or_correlated():
+    rng = np.random.default_rng(8)
+    alarms = sum(not judge([rng.standard_normal((1, 400)) for _ in range(4)]).is_noise for _ in range(200))
+    assert alarms <= 4  # of 200, at 0.5 % each
+    larger = [1.2 * rng.standard_normal((1, 400)) for _ in range(4)]
+    assert not judge(larger).is_noise
+    assert scale_test(larger, 1, 0.0, 0) < 1e-6
+    assert judge(larger, noise_uncertainty=0.2).is_noise  # noise that is known to a fifth only
+    x = rng.standard_normal((4, 1, 401))
+    moving = list((x[..., 1:] + 0.3 * x[..., :-1]) / np.sqrt(1.09))
+    assert correlation_test(moving) < 1e-6
+    assert "correlated" in judge(moving).because or not judge(moving).is_noise
