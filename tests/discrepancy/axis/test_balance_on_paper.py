@@ -1,0 +1,188 @@
+"""Laws and regression of the balance on a motion that is known on paper: no simulation, no noise but what is added."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+from ema.discrepancy.axis.balance.along import LINES
+from ema.discrepancy.axis.balance.apart import apart, by_record
+from ema.discrepancy.axis.balance.choice import chosen
+from ema.discrepancy.axis.balance.course import Course
+from ema.discrepancy.axis.balance.drifting import drifting
+from ema.discrepancy.axis.balance.found import Balance
+from ema.discrepancy.axis.balance.law import BY_RECORD, Acting, Law, one
+from ema.discrepancy.axis.balance.laws import laws
+from ema.discrepancy.axis.balance.links import links
+from ema.discrepancy.axis.balance.memory import remembering
+from ema.discrepancy.axis.balance.motion import Motion
+from ema.discrepancy.axis.balance.regression import Plain, fitted
+from ema.discrepancy.axis.balance.rows import Rows
+from ema.discrepancy.axis.balance.sampled import joined
+from ema.discrepancy.axis.balance.units import LINEAR, ROTARY, of_base
+from ema.discrepancy.axis.balance.widths import half_widths
+
+J, F_D, C = 2e-3, 0.05, 4e-3
+PLAIN = Plain(J, F_D, C)
+N, T_S = 6000, 1e-3
+
+
+def motion(**other) -> Motion:
+    """Two sines, with a neighbour that moves by a third; the drive gives what inertia, friction and drag need."""
+    t = T_S * np.arange(N)
+    parts = ((2.5, 2.1, 0.3), (0.7, 9.0, 1.1))
+    theta, w, a = (sum(x) for x in zip(*(_sine(t, *p) for p in parts), strict=True))
+    friction = F_D * np.sign(w) + C * w
+    made = Motion(t, theta, w, a, J * a + friction, J * a, np.sign(w), True, np.zeros(N, bool))
+    first = np.repeat((0, 1), N // 2)
+    of = {"other": _sine(t, 1.2, 5.3, 0.0), "neighbour": "outer", "dT": np.linspace(0.0, 40.0, N)}
+    return replace(made, record=first, records=("one", "two"), gear_orders=(7.3,), **{**of, **other})
+
+
+def _sine(t, A, w, phase):
+    return A * np.sin(w * t + phase), A * w * np.cos(w * t + phase), -A * w**2 * np.sin(w * t + phase)
+
+
+def rows(m: Motion, torque=0.0, noise=0.0) -> Rows:
+    """Means over ten samples, in forty blocks, of a balance in which a further torque opposes the motion."""
+    n = N // 10
+    mean = csr_array((np.full(N, 0.1), (np.arange(N) // 10, np.arange(N))), shape=(n, N))
+    m = replace(m, drive=m.drive + torque, known=m.known + torque)
+    y = mean @ m.known + noise * np.random.default_rng(0).standard_normal(n)
+    block = np.arange(n) * 40 // n
+    record = np.arange(n) * 2 // n
+    return Rows(m, y, mean @ m.drive, mean @ m.a, mean, mean * 0.0, block, np.ones(n, bool), record, np.ones(n), 0.01)
+
+
+def acting(m: Motion) -> Acting:
+    return Acting(m.drive, m.drive - F_D * m.direction, 0.5 * m.drive)
+
+
+@pytest.mark.parametrize("linear", [False, True])
+def test_every_law_has_columns_units_and_a_sentence(linear):
+    m = motion()
+    found = list(laws(m, linear=linear))
+    assert len({law.key for law in found}) == len(found)
+    for law in [*found, links(m), links(motion(neighbour="inner"))]:
+        columns = law.columns(m, acting(m))
+        assert len(columns) == law.n_columns, law.key
+        assert all(x.shape == (N,) and np.isfinite(x).all() for x in columns), law.key
+        values = law.values(np.linspace(0.3, 0.7, law.n_columns))
+        assert values.keys() >= law.parameters.keys(), law.key
+        assert "{" not in law.sentence.format(**values)
+
+
+@pytest.mark.parametrize("neighbour", ["inner", "outer"])
+def test_the_weak_form_of_linked_axes_is_the_strong_one(neighbour):
+    """f + dp/dt, where the column holds accelerations."""
+    m = motion(neighbour=neighbour)
+    law = links(m)
+    for column, (f, p) in zip(law.columns(m, acting(m)), law.weak(m), strict=True):
+        assert (f + np.gradient(p, m.t))[5:-5] == pytest.approx(column[5:-5], abs=2e-3 * np.abs(column).max() + 1e-9)
+
+
+@pytest.mark.parametrize("key", ["constant", "quadratic drag", "spring", "pendulum", "line 5", "gear line 7.3"])
+def test_a_law_beside_inertia_friction_and_drag_is_fitted_to_the_last_digit(key):
+    m = motion()
+    (law,) = (law for law in laws(m, linear=False) if law.key == key)
+    c = 0.02 * np.arange(1, law.n_columns + 1)
+    found = fitted(
+        rows(m, torque=sum(x * column for x, column in zip(c, law.columns(m, acting(m)), strict=True))), PLAIN, [law]
+    )
+    assert found.coefficients[found.part(law)] == pytest.approx(c, rel=1e-6)
+    assert found.coefficients[0] == pytest.approx(J, rel=1e-6)
+    assert found.loss == pytest.approx(0.0, abs=1e-12)
+
+
+def test_intervals_of_coefficients_hold_their_noise():
+    m, truth, inside = motion(), np.array([J, F_D, C]), 0
+    for seed in range(40):
+        made = rows(m)
+        y = made.y + F_D * (made.integrate @ m.direction) + C * (made.integrate @ m.w)
+        noise = 0.05 * np.random.default_rng(seed).standard_normal(len(y))
+        found = fitted(replace(made, y=y + noise, known={}), PLAIN, [])
+        inside += int((np.abs(found.coefficients - truth) < 2.0 * np.sqrt(np.diag(found.covariance()))).sum())
+    assert 0.85 * 120 < inside <= 120  # 95 % of three coefficients in forty
+
+
+def test_nothing_is_chosen_where_nothing_acts_and_a_drag_where_one_does():
+    m = motion()
+    every = [law for law in laws(m, linear=False) if law.family not in LINES]
+    nothing = chosen(rows(m, noise=0.01), PLAIN, every)
+    assert isinstance(nothing, Balance)
+    assert nothing.terms == ()
+    (term,) = chosen(rows(m, torque=2e-3 * m.w * np.abs(m.w), noise=0.01), PLAIN, every).terms
+    assert term.law.key == "quadratic drag"
+    assert term.wins > 0.95
+
+
+def test_a_law_by_record_is_the_shared_one_cut_in_two():
+    m = motion()
+    shared = Law("f", "f", "f", lambda m, _: (m.w**2,), {"c": "1"}, one("c"), "{c}", "")
+    own = by_record(shared, 2)
+    assert own.key == "f" + BY_RECORD
+    a, b = own.columns(m, acting(m))
+    assert a + b == pytest.approx(m.w**2)
+    assert (a * b == 0.0).all()
+    assert own.values(np.array([1.0, 3.0])) == {"c": 2.0}
+    found = fitted(rows(m, torque=np.where(m.record == 0, 0.01, 0.03) * m.w**2), PLAIN, [own])
+    assert found.coefficients[found.part(own)] == pytest.approx([0.01, 0.03], rel=1e-6)
+
+
+def test_what_differs_between_records_needs_two_and_keeps_the_mean():
+    m = motion()
+    units = of_base(ROTARY)
+    assert list(apart(replace(m, records=("one",)), [], units)) == []
+    by_name = {law.name: law for law in apart(m, [], units)}
+    law = by_name["dry_friction_by_record"]
+    assert law.parameters == {"spread": "N m"}
+    assert of_base(LINEAR)["inertia"] == "kg"
+    (column,) = law.columns(m, acting(m))
+    assert column == pytest.approx(np.where(m.record == 0, 1.0, -1.0) * m.direction)
+    assert law.values(np.array([0.02]))["spread"] == pytest.approx(0.04)
+
+
+def test_temperature_and_reversals_are_asked_for_only_where_they_are():
+    m = motion()
+    names = {law.name for law in drifting(m, "N m", "rad")}
+    assert {"friction_by_temperature", "viscous_by_temperature", "magnet_flux"} <= names
+    cold = {law.name for law in drifting(replace(m, dT=np.zeros(N)), "N m", "rad")}
+    assert cold == {"friction_drift", "viscous_drift"}
+    assert list(remembering(m, "N m", "rad"))
+    one_way = replace(m, theta=m.t * 3.0, w=np.full(N, 3.0), direction=np.ones(N))
+    assert list(remembering(one_way, "N m", "rad")) == []
+
+
+def test_friction_with_memory_lacks_least_long_after_a_reversal():
+    m = motion()
+    law = next(iter(remembering(m, "N m", "rad")))
+    (lacks,) = law.columns(m, acting(m))
+    turned = np.flatnonzero(np.diff(m.direction) != 0.0) + 1
+    assert np.abs(lacks[turned]).min() > 1.5  # friction still acts the old way
+    assert np.abs(lacks[turned[1:] - 1]).max() < 0.5
+
+
+def test_test_functions_are_as_wide_as_noise_wants_them():
+    m = motion()
+    bench = SimpleNamespace(roles=SimpleNamespace(kind="current"))
+
+    def of(sigma):
+        noisy = m.theta + sigma * np.random.default_rng(1).standard_normal(N)
+        course = Course("one", bench, m.t, m.drive, noisy, None, None, m.dT, {"position": sigma})
+        return half_widths([course])["one"]
+
+    widths = [of(sigma) for sigma in (1e-6, 1e-3, 1e-2)]
+    assert widths == sorted(widths)
+    assert widths[0] < widths[-1]
+
+
+def test_motions_are_joined_end_to_end():
+    m = motion()
+    both = joined([m, m])
+    assert both.w == pytest.approx(np.concatenate([m.w, m.w]))
+    assert both.neighbour == "outer"
+    assert joined([m, replace(m, neighbour="")]).neighbour == ""
