@@ -133,7 +133,9 @@ def test_fits_are_least_squares_within_bounds():
     assert [found.point["k"], found.point["a.size"]] == pytest.approx(exact, abs=0.02)  # Huber's weights
     assert jacobian(toy, free, found.point, blocks) == pytest.approx(-A, abs=1e-6)
     sd = np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
-    assert np.sqrt(np.diag(found.covariance)) == pytest.approx(sd, rel=0.1)
+    wider = np.sqrt(np.diag(found.covariance)) / sd
+    assert (wider > 0.99).all()
+    assert (wider < 1.0 + 3.0 / np.sqrt(2.0 * N_BLOCKS)).all()  # by no more than blocks disagree by chance
     low = [Free("k", "1", 0.5, 1.0, 0.5, 0.1), free[1]]
     held = best_fit(toy, low, [{"k": 0.6, "a.size": x} for x in (0.1, 1.0, 2.0)], blocks)
     assert held.point["k"] == 0.5
