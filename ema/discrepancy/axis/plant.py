@@ -17,8 +17,10 @@ from ema.models.axis_config import INSTANCE, LINES, Axis
 from ema.models.axis_layout import row
 
 from . import candidates, describe, structure
+from .balance.course import courses
 from .balance.found import Balance
-from .balance.of_records import balance
+from .balance.of_records import balance, plain_of
+from .balance.own_zeros import refined
 from .intake import intake
 from .measured import Zero
 from .naming import Numbers, numbers_of
@@ -67,6 +69,7 @@ class AxisPlant:
             lengths = [predictable(self, b) for b in self.benches]
             self._take([bench(plant, *parts) for parts in zip(records, names, lengths, strict=True)])
         self.zeros: dict[str, Zero] = zeros(self)
+        self.zeros = refined(self, courses(self), plain_of(plant))
         self._balances: dict[str, Balance | None] = {}
 
     @property

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ema.models.axis_config import LinearAxis
+from ema.models.axis_config import Axis, LinearAxis
 
 from .agreement import INEXACT, agreements
 from .apart import apart
@@ -37,11 +37,16 @@ N_WIDER = 3  # times that test functions are made twice as wide
 LONG = 0.5  # share of a row that must show which way friction acts, however small that is
 
 
+def plain_of(p: Axis) -> Plain:
+    """What the plant file says of what always acts."""
+    return Plain(p.inertia, p.F_d, p.C, 1.0 if p.is_force else float(p.k_t or 1.0))
+
+
 def balance(plant: Measured) -> Balance | None:
     """The balance of all records; None where no stretch of motion is long enough."""
     p = plant.plant
-    plain = Plain(p.inertia, p.F_d, p.C, 1.0 if p.is_force else float(p.k_t or 1.0))
-    recorded = with_zeros(plant, courses(plant), plain)
+    plain = plain_of(p)
+    recorded = with_zeros(plant, courses(plant))
     found = rows(plant, recorded)
     if found is None:
         return None

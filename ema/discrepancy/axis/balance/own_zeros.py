@@ -19,15 +19,15 @@ from .laws import laws
 from .regression import Plain, fitted
 
 if TYPE_CHECKING:
-    from ema.discrepancy.axis.measured import Measured
+    from ema.discrepancy.axis.measured import Measured, Zero
 
 
-def with_zeros(plant: Measured, recorded: Sequence[Course], plain: Plain) -> list[Course]:
-    """The courses with what is to be added to their angles."""
+def refined(plant: Measured, recorded: Sequence[Course], plain: Plain) -> dict[str, Zero]:
+    """The zeros of the plant's records by the lines of the balance, where a zero was found to be off."""
     moved = {name: zero.orders for name, zero in plant.zeros.items() if zero.angle}
     raw = rows(plant, list(recorded)) if moved else None
     if raw is None:
-        return list(recorded)
+        return plant.zeros
     names = raw.motion.records
     orders = sorted({n for own in moved.values() for n in own})
     keys = {f"line {n:.5g}": n for n in orders}
@@ -40,8 +40,13 @@ def with_zeros(plant: Measured, recorded: Sequence[Course], plain: Plain) -> lis
         for k, name in enumerate(names)
     }
     reference = next(name for name in names if name not in plant.zeros)
-    angles = {}
-    for name, own in moved.items():
-        refined = between({n: z[reference][n] for n in own if n in z[reference]}, z[name]).angle
-        angles[name] = plant.zeros[name].angle if refined is None else refined  # no law has a line of order 1
-    return [replace(c, zero=angles.get(c.record) or 0.0) for c in recorded]
+    found = {
+        name: between({n: z[reference][n] for n in own if n in z[reference]}, z[name]) for name, own in moved.items()
+    }
+    return {**plant.zeros, **{name: zero for name, zero in found.items() if zero.angle is not None}}
+
+
+def with_zeros(plant: Measured, recorded: Sequence[Course]) -> list[Course]:
+    """The courses with what is to be added to their angles."""
+    angles = {name: zero.angle or 0.0 for name, zero in plant.zeros.items()}
+    return [replace(c, zero=angles.get(c.record, 0.0)) for c in recorded]
