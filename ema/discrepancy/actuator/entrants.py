@@ -12,7 +12,7 @@ from ema.discrepancy.engine.statistic import Whitening
 
 from .features import Array
 from .fit import columns
-from .free import K_FREE
+from .free import K_FREE, Free
 from .noise import SEED, Noise
 from .problem import ActuatorProblem, as_cause
 from .search import Model, Search
@@ -85,13 +85,16 @@ def _standing(search: Search, first: list[Model]) -> list[Model]:
 
 
 def _entrant(search: Search, model: Model) -> Entrant:
-    """A fitted model with its columns; those of faults that were not free are simulated."""
+    """A fitted model with its columns; those that its fit did not need are simulated."""
     plant, point = search.plant, model.fit.point
     frees = {f.name: f for f in (*K_FREE, *model.fit.free)}
     motions = range(plant.n_motions)
     known = dict(model.fit.columns)
-    missing = [f for f in frees.values() if any((m, f.name) not in known for m in motions)]
-    known |= columns(plant, missing, point, motions)
+    missing: dict[tuple[Free, ...], list[int]] = {}  # motions that none was fitted to, faults that were not free
+    for m in motions:
+        missing.setdefault(tuple(f for f in frees.values() if (m, f.name) not in known), []).append(m)
+    for new, of in missing.items():
+        known |= columns(plant, new, point, of)
     causes = tuple(as_cause([c]) for c in model.effects)
     names = [*FAULTS, *(p.name for c in causes for p in c.parameters)]
     for name in names:

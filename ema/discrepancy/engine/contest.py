@@ -141,7 +141,7 @@ class Contest:
         freedom = (n_records - problem.grids) * len(problem.blocks)
         self.statistic = Statistic.of(self.whitening, directions.T, freedom)
         self.law_error = LawError(np.zeros((self.d, self.d)), 0.0, 0.0)
-        left = self.weigh(entrants[0]).prediction
+        left = self.weigh(entrants[:1])[0].prediction
         self.law_error = LawError.of(np.eye(self.d), -left.mean, left.rest - left.rest_mean)
 
     @property
@@ -149,9 +149,12 @@ class Contest:
         """Number of statistics."""
         return self.statistic.basis.shape[1]
 
-    def weigh(self, entrant: Entrant) -> Weighed:
-        """Simulate an entrant and integrate over all near it."""
-        (records,) = simulated(self.problem, [entrant.point], Pool.PREDICT, self.n)
+    def weigh(self, entrants: Sequence[Entrant]) -> list[Weighed]:
+        """Simulate entrants, all at once, and integrate over all near each."""
+        records = simulated(self.problem, [e.point for e in entrants], Pool.PREDICT, self.n)
+        return [self._weighed(e, r) for e, r in zip(entrants, records, strict=True)]
+
+    def _weighed(self, entrant: Entrant, records: Simulated) -> Weighed:
         parameters = (*self.problem.faults, *(p for c in entrant.causes for p in c.parameters))
         J = self.statistic.basis.T @ self.whitening.white(entrant.columns.T).T
         x = np.array([entrant.point.get(p.name, p.neutral) - p.neutral for p in parameters])
@@ -178,12 +181,12 @@ class Contest:
         sets: dict[tuple[str, ...], list[Entrant]] = {}
         for e in entrants:
             sets.setdefault(tuple(sorted(e.names)), []).append(e)
-        found = {key: self.weigh(of[0]) for key, of in sets.items()}
+        found = dict(zip(sets, self.weigh([of[0] for of in sets.values()]), strict=True))
         top = max(w.log_evidence for w in found.values())
         for key, of in sets.items():
             if top - found[key].log_evidence < BEHIND:
                 alike = [e for e in of[1:] if e.parameters == of[0].parameters][: EXPANSIONS - 1]
-                found[key] = together([self.settled(w) for w in (found[key], *map(self.weigh, alike))])
+                found[key] = together([self.settled(w) for w in (found[key], *self.weigh(alike))])
         ranked = sorted(found.values(), key=lambda w: -w.log_evidence)
         error = float(np.sqrt(np.mean([w.error**2 for w in ranked[:2]])))
         return Outcome(posterior({w.entrant.names: w.log_evidence for w in ranked}, error), ranked)
@@ -193,7 +196,7 @@ class Contest:
         for _ in range(TURNS):
             if w.felt < float(chi2.isf(OUTSIDE, len(w.parameters))):
                 break
-            moved = self.weigh(replace(w.entrant, point={**w.entrant.point, **w.point}))
+            (moved,) = self.weigh([replace(w.entrant, point={**w.entrant.point, **w.point})])
             self.say(f"{w.name}, simulated anew: {moved.log_evidence - w.log_evidence:+.1f} nats")
             w = moved
         return w
