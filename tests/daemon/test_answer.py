@@ -110,10 +110,11 @@ def test_arbitrary_answers_are_refused(job, coarse_bundle, line):
 
 
 class Liar(threading.Thread):
-    """Listens like a worker and answers each job with the next of some lines."""
+    """Listens like a worker, answers with the next of some lines: each job, or, if it persists, each connection."""
 
-    def __init__(self, path, lines):
+    def __init__(self, path, lines, persists=False):
         super().__init__(daemon=True)
+        self.persists = persists
         self.socket = socket.socket(socket.AF_UNIX)
         self.socket.bind(str(path))
         self.socket.listen(1)
@@ -123,8 +124,8 @@ class Liar(threading.Thread):
         for line in self.lines:
             connection, _ = self.socket.accept()
             with connection, connection.makefile("rb") as jobs:
-                jobs.readline()
-                connection.sendall(line + b"\n")
+                for _ in jobs if self.persists else [jobs.readline()]:
+                    connection.sendall(line + b"\n")
         self.socket.close()
 
 
@@ -161,7 +162,7 @@ def test_what_comes_late_on_a_connection_is_not_taken_for_the_next_answer(genuin
     """A wrong answer ends the connection: the one behind it would be a job late for ever."""
     right = json.dumps(genuine).encode()
     wrong = json.dumps(genuine | {"cycle": 6}).encode()
-    liar = Liar(tmp_path / "socket", [wrong, right])
+    liar = Liar(tmp_path / "socket", [wrong, right], persists=True)
     liar.start()
     remote = RemoteRunner(str(tmp_path / "socket"), {0: coarse_bundle}, timeout=20)
     with pytest.raises(WireError, match="cycle"):
