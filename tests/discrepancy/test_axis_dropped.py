@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ema.discrepancy.axis import candidates
@@ -9,6 +11,8 @@ from ema.discrepancy.axis.dropped import dropped
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.outcome import Gain, Outcome
 from ema.discrepancy.selection import base_model
+from ema.effects import registry
+from ema.effects.search import Span
 from ema.models.axis_config import RotaryAxis
 
 
@@ -23,8 +27,8 @@ def looked(axis_bench, drag, seed=1):
 
 
 def test_a_parameter_at_its_bound_is_fitted_again_with_wider_ones(axis_bench, monkeypatch):
-    narrow = {"viscous_drag": lambda plant, s: {"coefficient": (0.0, 2e-5, (1e-5,), 1e-5)}}
-    monkeypatch.setattr(candidates, "_BUILDERS", {**candidates._BUILDERS, **narrow})
+    narrow = replace(registry()["viscous_drag"], on_axis=lambda s: {"coefficient": Span(0.0, 2e-5, (1e-5,), 1e-5)})
+    monkeypatch.setattr(candidates, "registry", lambda: {**registry(), "viscous_drag": narrow})
     (entry,) = dropped(*looked(axis_bench, drag=1e-4), named=set())
     assert entry["name"] == "viscous_drag"
     assert "the end of what is searched (0 … 2e-05)" in entry["why"]
