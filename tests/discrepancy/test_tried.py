@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,10 +10,13 @@ import pytest
 
 from ema.core import config, resources
 from ema.discrepancy.actuator import candidates as actuator
+from ema.discrepancy.actuator import free
 from ema.discrepancy.actuator.gear import Resonance
+from ema.discrepancy.axis import candidates as axis
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.axis.screened import SCREENED
 from ema.effects import registry
+from ema.effects.search import Look
 from ema.models.actuator import Actuator
 from ema.models.axis_config import RotaryAxis
 
@@ -62,6 +66,29 @@ def test_the_axis(axis_bench):
     point = {free.name: free.start for free in plant.base}
     found = plant.candidates(point, range(len(plant.blocks)))
     assert not missed("axis", {c.effect for c in found})
+
+
+def test_an_effect_of_a_file_more_is_tried_on_both_plants(monkeypatch, axis_bench):
+    """What the file declares is all that a search needs; here of a drag by another name."""
+    belt = replace(registry()["viscous_drag"], name="belt_drag")
+    more = {**registry(), "belt_drag": belt}
+    for module in (actuator, free, axis):
+        monkeypatch.setattr(module, "registry", lambda: more)
+    signals = SimpleNamespace(u_dc=None, i=np.full((1, 3, 100), 5.0))
+    data = SimpleNamespace(zero=0.0, dT=np.zeros(2), signals=[signals, signals])
+    (c,) = [c for c in actuator.candidates(config.load(resources.config("actuator.yaml"), Actuator), data, [])
+            if c.effect == "belt_drag"]  # fmt: skip
+    (start,) = (p.start for p in belt.parameters)
+    assert c.probes() == [{"belt_drag.coefficient": start}]
+    record = axis_bench.record(axis_bench.Bench(), np.random.default_rng(1), duration=0.5)
+    plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [record])
+    found = {c.effect: c for c in axis.library(plant, {f.name: f.start for f in plant.base}, range(len(plant.blocks)))}
+    assert found["belt_drag"].free[0].high == found["viscous_drag"].free[0].high
+
+
+def test_a_look_at_what_is_no_parameter_is_refused():
+    with pytest.raises(ValueError, match="belt_drag: a look at \\['stiffness'\\]"):
+        replace(registry()["viscous_drag"], name="belt_drag", looks=(Look("stiffness"),))
 
 
 @pytest.mark.parametrize("plant", NOT_TRIED)
