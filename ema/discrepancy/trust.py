@@ -25,11 +25,11 @@ def without_unlikely(plant: Plant, state: State, progress: Progress) -> dict[str
         trust = _trust(plant, state)
         explained = is_explained(plant, state.plain, state.model)
         odds = {}
-        for c, (trials, before) in zip(state.model.accepted, state.rounds, strict=True):
+        for k, (c, (trials, before)) in enumerate(zip(state.model.accepted, state.rounds, strict=True)):
             if not c.is_structure:
                 weights = _weights(trials, before)
                 told = {c.key, *(key for key in alike(trials, c.key, before) if key in weights)}
-                no_cause = not explained and any(_leans(fitted, c) for fitted in state.model.fits)
+                no_cause = not explained and leans_in_a_fold(state.model, k)
                 odds[c.key] = 0.0 if no_cause else trust[c.key] * sum(weights[key] for key in told)
         worst = min(odds, key=lambda key: odds[key], default=None)
         if worst is None or odds[worst] >= UNLIKELY:
@@ -63,6 +63,11 @@ def told_effects(plant: Plant, state: State, trust: dict[str, float], point: Any
             }
         )
     return out
+
+
+def leans_in_a_fold(model: Tried, k: int) -> bool:
+    """Whether the k-th law leans on its bounds; folds may have it with other parameters, as lines of another order."""
+    return any(_leans(fitted, own[k]) for fitted, own in zip(model.fits, model.models, strict=True))
 
 
 def _leans(fitted: Fit, candidate: Candidate) -> bool:

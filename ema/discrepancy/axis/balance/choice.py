@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ema.core.records import Array
+from ema.discrepancy.axis.noise import ESTIMATE_UNCERTAINTY
 
 from .along import LINES
 from .found import Balance, Term
@@ -109,12 +110,9 @@ def _is_needed(new: Regression, old: Regression, whole: float) -> bool:
     clear = float(votes.sum()) > CLEAR * float(np.sqrt(len(d)) * np.std(votes))
     if not clear or gain < MATTERS * old.loss:
         return False
-    return gain > LEAST * whole or (_above_noise(old) > MATTERS * old.loss and _above_noise(new) < 0.5 * gain)
-
-
-def _above_noise(model: Regression) -> float:
-    """What is left of held-out rows beyond the sensors' noise. [N² m² or N²]"""
-    return max(model.loss - float(np.sum(model.rows.sigma[model.rows.whole] ** 2)), 0.0)
+    noise = float(np.sum(old.rows.sigma[old.rows.whole] ** 2))
+    is_seen = old.loss > (1.0 + 2.0 * ESTIMATE_UNCERTAINTY) * noise
+    return gain > LEAST * whole or (is_seen and new.loss - noise < 0.5 * gain)
 
 
 def _revised(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], whole: float) -> Regression:
