@@ -21,9 +21,9 @@ STEP = 0.004  # [s] between two events
 
 
 class Told:
-    """Numbers in a file that outlives the process, whatever the log does: last event, sync under way, longest stall."""
+    """Numbers in a file that outlives the process, whatever the log does: last and first event, sync, longest stall."""
 
-    LAST, SYNC, STALL = 0, 8, 16
+    LAST, SYNC, STALL, FIRST = 0, 8, 16, 24
 
     def __init__(self, path):
         self._file = os.open(path, os.O_CREAT | os.O_RDWR)
@@ -55,6 +55,8 @@ def child(directory):
         t_ns = time.monotonic_ns()
         log.event({"t_ns": t_ns, "level": "info", "code": "n", "text": str(n), "actuator": None})
         told.write(told.LAST, t_ns)
+        if n == 0:
+            told.write(told.FIRST, t_ns)
         n += 1
         time.sleep(STEP)
         told.stalled(time.monotonic_ns() - t_ns - int(1e9 * STEP))
@@ -93,7 +95,8 @@ def main(directory, trials, seed):
             os.waitpid(pid, 0)
             segments += len(list(place.glob("*.mcap")))
             told, last_ns = Told(place / "last"), survivors(place)
-            missing.append((told.read(told.LAST) - last_ns) / 1e9 if last_ns is not None else float("inf"))
+            kept_ns = told.read(told.FIRST) if last_ns is None else last_ns  # killed so soon that all is missing
+            missing.append((told.read(told.LAST) - kept_ns) / 1e9)
             under_way = killed_ns - (told.read(told.SYNC) or killed_ns)
             stalled.append(max(under_way, told.read(told.STALL)) / 1e9)
     result = {"trials": len(missing), "interval": INTERVAL, "segments": segments, "missing": missing}
