@@ -6,6 +6,7 @@ import pytest
 from hidden_traffic import watched
 
 from ema.core.status import Reason, Status
+from ema.identification.unbounded import p_possible
 from ema.monitor import Level
 
 N = 6  # cycles
@@ -49,6 +50,9 @@ def test_an_actuator_livelier_than_its_bundle_is_doubted_though_each_residual_fi
     assert all(high < 0.1 for _, high, _ in k6)  # wrong, by what each cycle tells alone
     assert sum(e.p_value > 1e-3 for e in seen.estimates) >= 2
     assert all(status is not Status.VALID for _, _, status in k6[2:])
+    for n, e in enumerate(seen.estimates):  # from the first on that the cycles so far tell, not from the third
+        told = p_possible([e.unbounded for e in seen.estimates[: n + 1]][-5:]) < 1e-3
+        assert not (told and e.status is Status.VALID)
     assert any(e.code == "model_in_doubt" for e in seen.events)
 
 
