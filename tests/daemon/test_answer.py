@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import socket
 import threading
+from contextlib import suppress
 
 import numpy as np
 import pytest
 from desks import loop
 from ema_daemon.answer import pack_answer, unpack_answer
 from ema_daemon.remote import RemoteRunner
-from ema_daemon.wire import WireError, fingerprint
+from ema_daemon.wire import MAX_LINE, WireError, fingerprint
 from ema_daemon.worker import Worker
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -170,3 +171,26 @@ def test_what_comes_late_on_a_connection_is_not_taken_for_the_next_answer(genuin
     assert remote.run(job).method == "lf2"
     remote.close()
     liar.join(10)
+
+
+def test_a_line_without_end_is_given_up_at_a_limit(job, coarse_bundle, tmp_path):
+    """Not at the time-out, until which it would fill the memory."""
+    told = threading.Event()
+
+    def pour(server):
+        connection, _ = server.accept()
+        with connection, suppress(OSError):
+            connection.sendall(b"1" * (2 * MAX_LINE))
+            told.wait(60)
+
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(tmp_path / "socket"))
+        server.listen(1)
+        pouring = threading.Thread(target=pour, args=(server,), daemon=True)
+        pouring.start()
+        remote = RemoteRunner(str(tmp_path / "socket"), {0: coarse_bundle}, timeout=10)
+        with pytest.raises(WireError, match="closed the connection"):
+            remote.run(job)
+        told.set()
+        remote.close()
+        pouring.join()
