@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ema.discrepancy.selection import FORM
-
 from .agreement import Agreement, against
 from .law import Law
 from .regression import Corrected, Plain, Regression
@@ -63,11 +61,9 @@ class Balance:
     def confidence(self, term: Term) -> float:
         """How often the law wins, times its mark over that and what of the rest it may have been taken for.
 
-        The rest is what is left, and what the wrong form of the other laws may leave. What records contradict each
-        other in counts against it.
+        What records contradict each other in counts against it.
         """
-        others = sum(own.power for own in self.terms) - term.power
-        rest = term.common * (max(self.left - self.noise, 0.0) + FORM**2 * max(others, 0.0))
+        rest = term.common * max(self.left - self.noise, 0.0)
         sure = term.wins * term.power / (term.power + rest) if term.power > 0.0 else 0.0
         return sure * against(term.law, self.agreements)
 
