@@ -40,6 +40,9 @@ def trial(t: strata_axis.Trial, threads: int) -> dict[str, Any]:
         found = findings(plant, examined(plant))
     except RecordError as error:
         return {**told, "outcome": "refused", "said": [str(error)]}
+    except Exception as error:  # a defect: it counts against the finder, and the run goes on
+        failed = {"outcome": "crashed", "verdict": "crashed", "named": [], "confidence": [], "z": {}}
+        return {**told, **failed, "cpu_s": time.process_time() - begun, "said": [f"{type(error).__name__}: {error}"]}
     said = found.as_dict()
     # of two lines of cogging the first, larger one is the one whose amplitude is told in the truth
     quantities = {f"{e.name}.{name}": q for e in reversed(found.effects) for name, q in e.parameters.items()}

@@ -14,6 +14,7 @@ from ema.discrepancy.axis.balance.of_records import balance
 from ema.discrepancy.axis.balance.telling import told
 from ema.discrepancy.axis.between import examined
 from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.plant import Candidate, Free
 from ema.models.axis_config import RotaryAxis
 
 WARM_UP = (22.0, 58.0, 4.0)
@@ -162,3 +163,17 @@ def test_without_a_load_there_is_nothing_that_friction_by_load_could_grow_with(g
     (held,) = (law for law in laws(m, linear=False) if law.key == "friction by held")
     (column,) = held.columns(m, model.acting)
     assert not column.any()
+
+
+def test_what_is_held_beside_a_fitted_parameter_is_told_with_it(geared):
+    """The share per kelvin is fitted, the friction that it is a share of comes from the balance."""
+    share = Free("viscous_by_temperature.per_kelvin", "1/K", -0.1, 0.1, 0.02, 0.01, 1e-3)
+    held = {"viscous_by_temperature.coefficient": 0.006}
+    c = Candidate("viscous_by_temperature", "viscous_by_temperature", (share,), ({**held, share.name: 0.02},))
+    at = {**held, share.name: 0.058}
+    (entry,) = plant_of(geared, seconds=2.0).describe(
+        [c], at, lambda n: [{**at, share.name: 0.058 + d} for d in (-1e-3, 1e-3)]
+    )
+    assert entry["parameters"]["per_kelvin"]["value"] == 0.058
+    assert entry["parameters"]["coefficient"]["value"] == 0.006
+    assert "5.80%" in entry["sentence"]

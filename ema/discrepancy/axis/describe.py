@@ -33,10 +33,10 @@ def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Se
         names = {f.name for f in candidate.free}
         mine = numbers_of({name: value for name, value in point.items() if name in names})
         strongest = max((v.get("amplitude", 0.0) for v in own.effects.values()), default=0.0)
-        for values in mine.effects.values():
+        for part in mine.effects.values():
+            key, values = _whole(own.effects, part)
             if effect.name == "cogging" and values["amplitude"] < MIN_LINE * strongest:
                 continue
-            key = _key(own.effects, values)
             said = _said(plant)
             unit = {p.name: said(p.unit) for p in effect.parameters}
             parameters = {}
@@ -106,8 +106,9 @@ def _electrical(plant: Measured, values: dict[str, float]) -> dict[str, Any]:
     }
 
 
-def _key(effects_: dict[str, dict[str, float]], values: dict[str, float]) -> str:
-    return next(key for key, other in effects_.items() if other == values)
+def _whole(effects_: dict[str, dict[str, float]], part: dict[str, float]) -> tuple[str, dict[str, float]]:
+    """The effect that `part` is of, with what of it was held: of friction by temperature, the friction itself."""
+    return next((key, values) for key, values in effects_.items() if part.items() <= values.items())
 
 
 def structure(plant: Measured, terms: Sequence[Candidate], point: Point) -> dict[str, Any]:
