@@ -14,6 +14,8 @@ noise                      error beyond                                       ad
 not noise                  error and residual within `LIMIT`                  adequate, note  /  explained, note
 not noise                  error within; residual beyond, no more than the    unexplained     /  explained, note
                            form of the laws that are named may leave
+not noise                  error beyond by no more than parts scatter,        adequate, note  /  partly explained
+                           residual within
 not noise                  anything else                                      unexplained     /  partly explained
 =========================  =================================================  ==================================
 """
@@ -60,9 +62,14 @@ class Left:
         return LIMIT * (1.0 + UPPER * self.noise_uncertainty)
 
     @property
-    def most(self) -> float:
-        """Error or residual over what noise makes of it, whichever is larger; 1 is noise."""
-        return max(self.error.rest, self.residual.rest)
+    def is_sure(self) -> bool:
+        """Whether more is left than noise makes: of the residual, or of the error by more than its parts scatter.
+
+        The residual is weighed by its noise, so that each part counts for what it can tell. The error in the plant's
+        own unit is not: of free runs one part may make most of it.
+        """
+        error = self.error.rest - UPPER * self.error.rest_error if len(self.error.names) > 1 else self.error.rest
+        return self.residual.rest > self.allowed or error > self.allowed
 
     @property
     def sentence(self) -> str:
@@ -77,6 +84,6 @@ class Left:
 def graded(left: Left, *, named: bool) -> Verdict:
     """The verdict on what `left` says, with causes `named` or without any."""
     if not named:
-        return "adequate" if left.is_chance or left.most <= left.allowed else "unexplained"
+        return "adequate" if left.is_chance or not left.is_sure else "unexplained"
     is_little = left.is_chance or left.is_form or left.residual.rest <= left.allowed
     return "explained" if is_little and left.error.rest <= LIMIT else "partly explained"

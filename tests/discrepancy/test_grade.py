@@ -67,6 +67,15 @@ def test_noise_that_was_estimated_may_be_larger_and_nothing_is_claimed_by_that()
     assert graded(loud, named=True) == "partly explained"
 
 
+def test_one_part_that_runs_away_raises_no_alarm_where_the_residual_is_noise_and_is_no_claim_either():
+    """A stage with nothing hidden left 1.75 ± 0.88 floors of its free runs and 1.10 of the residual."""
+    away = folds(*[1.0] * 9, 5.0)
+    assert graded(Left(False, away, folds(1.1, 1.1)), named=False) == "adequate"
+    assert graded(Left(False, away, folds(1.1, 1.1)), named=True) == "partly explained"
+    assert graded(Left(False, away, folds(1.1, 3.0)), named=False) == "unexplained"
+    assert graded(Left(False, folds(*[1.7] * 9, 1.9), folds(1.1, 1.1)), named=False) == "unexplained"
+
+
 def test_one_lucky_part_does_not_make_it_explained():
     """The part that a single split would have held out is at noise; the others are not."""
     unlucky = folds(1.0, 1.5, 1.5, 1.5, 1.5, 1.5)
