@@ -50,8 +50,9 @@ def examine(plant: Plant, progress: Progress | None = None) -> Outcome:
         )
     if state.immaterial and outcome in ("adequate", "explained"):
         notes.append(f"{state.immaterial}: too little for a cause")
-    last = judged(plant, state.model)
-    folds = over_folds(plant, plain, state.model)
+    # with terms that have no name, more is told than the verdict asked for
+    is_chance = judged(plant, state.model).is_noise if terms else left.is_chance
+    folds = over_folds(plant, plain, state.model) if terms else left.error
     names = [f.name for f in plant.base]
     return Outcome(
         verdict=outcome,
@@ -73,7 +74,7 @@ def examine(plant: Plant, progress: Progress | None = None) -> Outcome:
         k_error=tuple(np.sqrt(np.diag(final.covariance))[: len(names)].tolist()),
         point=final.point,
         notes=notes,
-        rest=0.0 if last.is_noise else state.model.rms,
+        rest=0.0 if is_chance else state.model.rms,
     )
 
 
