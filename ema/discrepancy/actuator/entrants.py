@@ -95,7 +95,7 @@ def _entrant(search: Search, model: Model) -> Entrant:
         missing.setdefault(tuple(f for f in frees.values() if (m, f.name) not in known), []).append(m)
     for new, of in missing.items():
         known |= columns(plant, new, point, of)
-    causes = tuple(as_cause([c]) for c in model.effects)
+    causes = tuple(as_cause(c) for c in model.effects)
     names = [*FAULTS, *(p.name for c in causes for p in c.parameters)]
     for name in names:
         if name not in frees:  # a parameter that a path has fixed

@@ -11,15 +11,12 @@ be compared; D is what the form of a law may leave, one and the same for all of 
 Graph. Stat. 30, 2021). The evidence of a set is ℓ integrated over sizes and over subsets of faults.
 
 =============  ===========================================================================================
-`hypothesis`   parameters, causes, hypotheses as values, and what the engine asks of a plant
-`records`      pools of seeds that are never mixed: whitening, prediction, test, columns
+`hypothesis`   parameters and causes as values, and what the engine asks of a plant
+`records`      pools of seeds that are never mixed: what predicts, and what the statistics rest on
 `statistic`    whitening, projection, rest
 `law_error`    D: what a law of another form may leave, by what faults alone leave
 `evidence`     the integral over sizes within bounds and over subsets of faults, closed form where linear
-`fit`          from several starts, along singular directions, to the least misfit
-`moves`        from a set of causes to its neighbours, as data
-`posterior`    probabilities of sets, never surer than the evidence; credible sets; the predictive test
-`weighing`     one scale for all: whitening, statistics and law error at one point, and the score by them
-`search`       the loop over all of these
+`posterior`    probabilities of sets, never surer than the evidence
+`contest`      hypotheses that a search has fitted, weighed on one scale: whitening, statistics, law error
 =============  ===========================================================================================
 """

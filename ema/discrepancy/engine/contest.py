@@ -16,7 +16,7 @@ from scipy.stats import chi2
 from .evidence import Evidence, evidence
 from .hypothesis import Array, Cause, Parameter, Point, Problem
 from .law_error import SHARES, LawError
-from .posterior import Entry, posterior
+from .posterior import Entry, log_prior, posterior
 from .records import Pool, Simulated, simulated
 from .statistic import Prediction, Statistic, Whitening
 
@@ -140,9 +140,9 @@ class Contest:
         directions = self.whitening.white(np.array([*moved, *(x - null for x in others)]))
         freedom = (n_records - problem.grids) * len(problem.blocks)
         self.statistic = Statistic.of(self.whitening, directions.T, freedom)
-        self.law_error = LawError(np.zeros((self.d, self.d)), 0.0, 0.0)
+        self.law_error = LawError(self.d, 0.0, 0.0)
         left = self.weigh(entrants[:1])[0].prediction
-        self.law_error = LawError.of(np.eye(self.d), -left.mean, left.rest - left.rest_mean)
+        self.law_error = LawError.of(left.mean, left.rest - left.rest_mean)
 
     @property
     def d(self) -> int:
@@ -170,11 +170,10 @@ class Contest:
         own = of(whole)
         # of halves the mean alone: their covariance is of too few
         moved = [of(replace(whole, mean=half.mean, rest=half.rest)).log_z for half in halves]
-        prior = sum(float(np.log(c.prior) - np.log1p(-c.prior)) for c in entrant.causes)
         step = J @ (own.mean - x)
         felt = float(step @ np.linalg.solve(whole.covariance, step))
         error = abs(moved[0] - moved[1]) / 2.0
-        return Weighed(entrant, parameters, whole, own, own.log_z + prior, error, felt)
+        return Weighed(entrant, parameters, whole, own, own.log_z + log_prior(entrant.causes), error, felt)
 
     def run(self, entrants: Sequence[Entrant]) -> Outcome:
         """All sets of causes weighed, by the first entrant of each; those near the leader by their other ones too."""

@@ -1,9 +1,9 @@
-"""Parameters, causes and hypotheses as values, and what the engine asks of a plant with its record."""
+"""Parameters and causes as values, and what the engine asks of a plant with its record."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -20,53 +20,25 @@ class Parameter:
     Attributes
     ----------
     low, high : float
-        What is credible; a search stays within.
+        What is credible.
     usual : float
         How far from `neutral` it usually is, where it is not neutral.
-    step : float
-        A change that is clearly felt: where differences begin.
     """
 
     name: str
     low: float
     high: float
     usual: float
-    step: float
     neutral: float = 0.0
 
 
 @dataclass(frozen=True)
 class Cause:
-    """Something that the simulation may lack.
-
-    Attributes
-    ----------
-    prior : float
-        Probability that it is there.
-    starts : tuple of Points
-        Where fits begin, beside the one that first order gives.
-    stands_for : tuple of str
-        Faults that it can be taken for.
-    """
+    """Something that the simulation may lack, with the prior probability that it is there."""
 
     name: str
     parameters: tuple[Parameter, ...]
     prior: float
-    starts: tuple[Point, ...] = ()
-    stands_for: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """Causes that are there, and where their parameters and the faults are."""
-
-    causes: tuple[str, ...]
-    point: Point = field(default_factory=dict)
-
-    @property
-    def key(self) -> frozenset[str]:
-        """The set of causes."""
-        return frozenset(self.causes)
 
 
 class Block(NamedTuple):
@@ -104,15 +76,6 @@ class Problem(Protocol):
         """Parameters that are free in every hypothesis, each there or not."""
         ...
 
-    @property
-    def causes(self) -> Sequence[Cause]:
-        """Everything that may be there."""
-        ...
-
     def records(self, points: Sequence[Point], seeds: range) -> Array:
         """Features of simulated records, (n_points, n_seeds, n_features); all points share the seeds."""
-        ...
-
-    def differences(self, point: Point, points: Sequence[Point], seeds: range) -> Array:
-        """Mean features at `points` less those at `point`, by common random numbers, (n_points, n_features)."""
         ...

@@ -17,33 +17,32 @@ SHARES = (0.0, 0.003, 0.01, 0.03, 0.1)
 
 @dataclass(frozen=True)
 class LawError:
-    """D = δ² |r|² U Uᵀ / n, where r is what faults alone leave and U the n unit columns of all candidates.
+    """D = δ² |r|² I / d, where r is what faults alone leave of the d statistics.
+
+    As much in every direction: along candidates' columns a pair of nearly parallel ones that cancel would be bought.
 
     Attributes
     ----------
-    shape : array, shape (d, d)
-        Of unit trace.
+    d : int
     left : float
         |r|², beyond noise.
     rest : float
-        The same outside the candidates' span.
+        The same outside the statistics.
     """
 
-    shape: Array
+    d: int
     left: float
     rest: float
 
     @classmethod
-    def of(cls, columns: Array, residual: Array, rest: float) -> LawError:
-        """From projected columns (d, n) of all candidates and what faults alone leave (d,) and outside the span."""
-        length = np.linalg.norm(columns, axis=0)
-        U = columns[:, length > 0.0] / length[length > 0.0]
-        return cls(U @ U.T / max(U.shape[1], 1), max(float(residual @ residual) - len(residual), 0.0), max(rest, 0.0))
+    def of(cls, residual: Array, rest: float) -> LawError:
+        """From what faults alone leave of the statistics (d,), and outside of them."""
+        return cls(len(residual), max(float(residual @ residual) - len(residual), 0.0), max(rest, 0.0))
 
     def covariance(self, share: float) -> Array:
         """D for a share δ."""
-        return np.asarray(share**2 * self.left * self.shape)
+        return np.asarray(share**2 * self.left * np.eye(self.d) / self.d)
 
     def of_rest(self, share: float) -> float:
-        """Expected square outside the span for a share δ."""
+        """Expected square outside the statistics for a share δ."""
         return share**2 * (self.rest + self.left)

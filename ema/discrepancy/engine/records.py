@@ -1,4 +1,4 @@
-"""Pools of seeds: runs that whiten, predict, test or give columns are never the same runs."""
+"""Pools of seeds: runs that whiten, those that predict and those that give directions are never the same."""
 
 from __future__ import annotations
 
@@ -17,9 +17,7 @@ SIZE = 1_000_000  # seeds of a pool
 class Pool(IntEnum):
     """What a simulated record is used for."""
 
-    WHITEN = 1
     PREDICT = 2
-    TEST = 3
     COLUMN = 4
 
 
@@ -27,11 +25,9 @@ class OwnRecordsError(ValueError):
     """Runs were to be judged by a whitening that was made of them."""
 
 
-def seeds(pool: Pool, n: int, first: int = 0) -> range:
-    """`n` seeds of a pool, from its `first` on."""
-    if first + n > SIZE:
-        raise ValueError(f"{first + n} seeds of pool {pool.name}: there are {SIZE}")
-    return range(pool * SIZE + first, pool * SIZE + first + n)
+def seeds(pool: Pool, n: int) -> range:
+    """The first `n` seeds of a pool."""
+    return range(pool * SIZE, pool * SIZE + n)
 
 
 @dataclass(frozen=True)
@@ -56,8 +52,8 @@ class Simulated:
             raise OwnRecordsError(f"seeds {self.seeds} share runs with {other}: take another pool")
 
 
-def simulated(problem: Problem, points: Sequence[Point], pool: Pool, n: int, first: int = 0) -> list[Simulated]:
+def simulated(problem: Problem, points: Sequence[Point], pool: Pool, n: int) -> list[Simulated]:
     """Records of several points, with the same seeds; what honest simulations may differ by is part of their noise."""
-    of = seeds(pool, n, first)
+    of = seeds(pool, n)
     floor = problem.floors * np.array([np.random.default_rng(seed).standard_normal(len(problem.floors)) for seed in of])
     return [Simulated(features + floor, of, problem.grids) for features in problem.records(points, of)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,21 +45,6 @@ class Whitening:
     factors: dict[int, Array]
     blocks: tuple[Block, ...]
     seeds: range
-
-    @classmethod
-    def of(cls, records: Simulated, blocks: Sequence[Block], floors: Array) -> Whitening:
-        """From simulated records; blocks of one kind have one noise."""
-        away = records.features - records.features.mean(axis=0)
-        away *= np.sqrt(len(away) / (len(away) - 1.0))
-        sd, factors = np.empty_like(floors), {}
-        for kind in sorted({block.kind for block in blocks}):
-            same = [block.at for block in blocks if block.kind == kind]
-            x = np.concatenate([away[:, at] for at in same])
-            of = np.sqrt((x**2).mean(axis=0) + floors[same[0]] ** 2)
-            factors[kind] = cholesky(shrunk_correlation(x / of), lower=True, check_finite=False)
-            for at in same:
-                sd[at] = of
-        return cls(sd, factors, tuple(blocks), records.seeds)
 
     def white(self, x: Array) -> Array:
         """Rows (..., n_features) in units of noise."""

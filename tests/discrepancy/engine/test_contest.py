@@ -7,8 +7,8 @@ import pytest
 
 from ema.discrepancy.engine.contest import Contest, Entrant, Outcome
 from ema.discrepancy.engine.posterior import p_cause
-from ema.discrepancy.engine.records import Pool, simulated
-from ema.discrepancy.engine.statistic import Prediction, Statistic, Whitening
+from ema.discrepancy.engine.records import OwnRecordsError, Pool, seeds, simulated
+from ema.discrepancy.engine.statistic import Prediction, Statistic
 
 NAMES = ("a", "b", "c")
 
@@ -20,9 +20,7 @@ def entrant(toy, *causes: str, **point: float) -> Entrant:
 
 
 def held(toy, *entrants: Entrant, n_records: int = 16) -> Outcome:
-    (white,) = simulated(toy, [{}], Pool.WHITEN, 48)
-    whitening = Whitening.of(white, toy.blocks, toy.floors)
-    return Contest(toy, entrants, whitening, n_records, lambda text: None).run(entrants)
+    return Contest(toy, entrants, toy.whitening(), n_records, lambda text: None).run(entrants)
 
 
 def test_the_true_cause_leads_and_its_size_is_within_its_deviations(toys):
@@ -57,6 +55,15 @@ def test_faults_alone_stand_where_they_do_it(toys):
     assert outcome.weighed[0].evidence.p_fault == pytest.approx([0.0, 1.0], abs=0.3)
 
 
+@pytest.mark.parametrize("faults", [{}, {"k1": 4.0}])
+def test_neither_nothing_nor_a_fault_is_a_cause(toys, faults):
+    """Of forty records without a cause none has one with 0.9."""
+    for seed in range(20):
+        toy = toys.plant(2, NAMES, seed=seed, truth=faults)
+        outcome = held(toy, entrant(toy, **faults), *(entrant(toy, name, **faults) for name in NAMES))
+        assert all(p_cause(outcome.posterior, name) < 0.9 for name in NAMES), seed
+
+
 def test_a_cancelling_pair_is_not_bought(toys):
     """It fits better by far; what a law may leave is the same for all."""
     rng = np.random.default_rng([12, 1])
@@ -75,10 +82,9 @@ def test_what_a_grid_makes_of_all_blocks_is_part_of_the_noise(toys):
     rng = np.random.default_rng(11)
     of_grid = 2.0 * rng.standard_normal((4, 24))
     toy = toys.plant(1, NAMES, seed=1, grids=4, of_grid=of_grid)
-    (white,) = simulated(toys.plant(1, NAMES, seed=1), [{}], Pool.WHITEN, 400)
-    whitening = Whitening.of(white, toy.blocks, toy.floors)
+    whitening = toy.whitening()
     statistic = Statistic.of(whitening, whitening.white(np.array(list(toy.columns.values()))).T, 48)
-    (many,) = simulated(toy, [{}], Pool.TEST, 4000)
+    (many,) = simulated(toy, [{}], Pool.COLUMN, 4000)
     true = np.cov(statistic(many.features)[0].T)
     (few,) = simulated(toy, [{}], Pool.PREDICT, 64)
     found = Prediction.of(statistic, few, toy.measured).covariance
@@ -116,3 +122,33 @@ def test_where_a_response_is_not_linear_the_interval_holds_what_other_points_say
             found.append((mean - truth) / sd)
     assert np.mean(np.square(together)) < 0.6 * np.mean(np.square(alone))
     assert np.max(np.abs(together)) < 4.0
+
+
+def test_whitening_by_ones_own_records_is_refused(toys):
+    toy = toys.plant(2, NAMES)
+    columns = np.array(list(toy.columns.values()))
+    for pool, refused in ((Pool.PREDICT, True), (Pool.COLUMN, False)):
+        whitening = toy.whitening(seeds(pool, 48))
+        statistic = Statistic.of(whitening, whitening.white(columns).T, 48)
+        (records,) = simulated(toy, [{}], Pool.PREDICT, 16)
+        if refused:
+            with pytest.raises(OwnRecordsError, match="another pool"):
+                Prediction.of(statistic, records, toy.measured)
+        else:
+            assert Prediction.of(statistic, records, toy.measured).n_records == 16
+
+
+def test_the_error_of_the_evidence_is_what_other_records_would_move_it_by(toys):
+    """Halves of the records foretell how the evidence scatters over other records."""
+    z, errors = [], []
+    for other in range(40):
+        toy = toys.plant(2, NAMES, seed=3, truth={"a.size": 30.0})
+        made = toy.records
+        toy.records = lambda points, of, made=made, other=other: made(
+            points, range(of.start + 100 * other, of.stop + 100 * other)
+        )
+        off = entrant(toy, "a", **{"a.size": 26.0})  # so that the mean's own noise counts
+        (w,) = Contest(toy, [entrant(toy), off], toy.whitening(), 24, lambda text: None).weigh([off])
+        z.append(w.log_evidence)
+        errors.append(w.error)
+    assert 0.5 < np.sqrt(np.mean(np.square(errors))) / np.std(z) < 2.0

@@ -13,8 +13,6 @@ from ema.discrepancy.engine.law_error import LawError
 from ema.discrepancy.engine.posterior import log_prior, posterior
 from ema.discrepancy.engine.statistic import Prediction
 
-NONE = LawError(np.zeros((1, 1)), 0.0, 0.0)
-
 
 def known(mean: np.ndarray) -> Prediction:
     """Noise of unit covariance, and a rest as it should be."""
@@ -25,7 +23,7 @@ def test_one_fault_and_one_size_agree_with_the_integral_done_on_a_grid(toys):
     rng = np.random.default_rng(3)
     fault, size = toys.parameter("k1", low=0.0), toys.parameter("size", high=6.0)
     J, t = rng.standard_normal((5, 2)), 2.0 * rng.standard_normal(5)
-    found = evidence(known(-t), J, np.zeros(2), [fault], [[size]], LawError(np.zeros((5, 5)), 0.0, 0.0), (0.0,))
+    found = evidence(known(-t), J, np.zeros(2), [fault], [[size]], LawError(5, 0.0, 0.0), (0.0,))
     k, u = np.linspace(0.0, 60.0, 1501), np.linspace(-60.0, 6.0, 1501)
     like = np.exp(-0.5 * ((t - J[:, 0] * k[:, None, None] - J[:, 1] * u[:, None]) ** 2).sum(axis=-1))
     like /= (2.0 * np.pi) ** 2.5
@@ -67,7 +65,8 @@ def _drawn_toys(toys):
     d, names = 6, ("a", "b", "c")
     plant = toys.plant(2, names)
     sets = list(chain.from_iterable(combinations(names, n) for n in range(3)))
-    prior = np.exp([log_prior(s, plant.causes) for s in sets])
+    priors = {s: log_prior(c for c in plant.causes if c.name in s) for s in sets}
+    prior = np.exp(list(priors.values()))
     for _ in range(N_TOYS):
         J = dict(zip(("k1", "k2", *names), rng.standard_normal((5, d)), strict=True))
         J["b"] = J["a"] + 0.3 * J["b"]  # look-alikes
@@ -83,9 +82,9 @@ def _drawn_toys(toys):
         for s in sets:
             columns = np.array([J[name] for name in ("k1", "k2", *s)]).T
             of = [c.parameters for c in plant.causes if c.name in s]
-            law = LawError(np.zeros((d, d)), 0.0, 0.0)
+            law = LawError(d, 0.0, 0.0)
             found = evidence(known(-t), columns, np.zeros(columns.shape[1]), plant.faults, of, law, (0.0,))
-            log_z[s] = found.log_z + log_prior(s, plant.causes)
+            log_z[s] = found.log_z + priors[s]
         yield truth, posterior(log_z, 0.0)
 
 

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ema.discrepancy.engine.hypothesis import Block, Cause, Parameter, Point
+from ema.discrepancy.engine.statistic import Whitening
 
 INF = float("inf")
 
 
 def parameter(name: str, usual: float = 3.0, low: float = -100.0, high: float = 100.0) -> Parameter:
-    return Parameter(name, low, high, usual, step=10.0)
+    return Parameter(name, low, high, usual)
 
 
 @dataclass
@@ -65,8 +66,12 @@ class Toy:
         noise = noise + (self.of_grid[np.arange(len(seeds)) % self.grids] if self.grids > 1 else 0.0)
         return np.array([self.mean(point) + noise for point in points])
 
-    def differences(self, point: Point, points: Sequence[Point], seeds: range) -> np.ndarray:
-        return np.array([self.mean(p) - self.mean(point) for p in points])
+    def whitening(self, seeds: range = range(0)) -> Whitening:
+        """By the noise as it is, as if made of the runs of `seeds`."""
+        cov = self.noise**2 * self.mixing @ self.mixing.T + np.diag(self.floors**2)
+        sd = np.sqrt(np.diag(cov))
+        of = {b.kind: np.linalg.cholesky((cov / np.outer(sd, sd))[b.at, b.at]) for b in self.blocks}
+        return Whitening(sd, of, self.blocks, seeds)
 
 
 def plant(
