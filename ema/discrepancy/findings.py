@@ -202,7 +202,11 @@ class Findings:
                 return ["The simulation agrees with the measurement: what is left is noise."]
             left = f"What is left is small, {self.rest:.3g} times the noise, but it is not noise"
             return [left + ("; its structure: " + describe(self.structure) if self.structure else "") + "."]
-        said = [_said(effect) for effect in self.effects]
+        said = []
+        told: set[str] = set()  # experiments: each is told in full once
+        for effect in self.effects:
+            said.append(_said(effect, again=effect.separated_by in told))
+            told.add(effect.separated_by)
         if self.verdict == "explained" and self.rest > SEEN:
             said.append(
                 f"What is left is {self.rest:.3g} times the noise, not noise: a law has not quite the right form, or "
@@ -226,8 +230,12 @@ WITHIN = 1.96  # deviations from the value to either end of an interval of 95 %
 SEEN = 1.05  # times the noise, where a rest beside a cause is worth a word
 
 
-def _said(effect: FoundEffect) -> str:
-    """The effect's sentence with its reservations; those in a set share what is sure of it."""
+def _said(effect: FoundEffect, again: bool = False) -> str:
+    """The effect's sentence with its reservations; those in a set share what is sure of it.
+
+    Where the experiment that tells has been told before (`again`), it is not told in full.
+    """
+    how = "likewise" if again else f"by {effect.separated_by}"
     others = effect.indistinguishable_from
     odds = effect.of_set
     text = effect.sentence[0].upper() + effect.sentence[1:]
@@ -238,9 +246,9 @@ def _said(effect: FoundEffect) -> str:
         text = f"Perhaps, with a confidence of {odds:.0%} only: {which}"
         text += f", {effect.sentence}" if others else ""
     if others:
-        text += f"; or {' or '.join(others)} (told apart by {effect.separated_by})"
+        text += f"; or {' or '.join(others)} (told apart {how})"
     elif odds < SURE:
-        text += f" (to be confirmed by {effect.separated_by})"
+        text += f" (to be confirmed {how})"
     return text + "."
 
 

@@ -55,6 +55,7 @@ def write_report(
         f=findings,
         g=findings.gain,
         sentences=findings.sentences(),
+        alike=_alike(findings),
         pictures=pictures,
         software=version(),
         css=pages.style(),
@@ -65,3 +66,11 @@ def write_report(
         os.replace(unfinished, path)
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+def _alike(findings: Findings) -> str:
+    """What the headline adds where a cause is one of several that fit alike."""
+    sets = [bool(effect.indistinguishable_from) for effect in findings.effects]
+    if not any(sets) or findings.verdict == "unexplained":
+        return ""
+    return ", by one of several that fit alike" if all(sets) else ", some of it by one of several that fit alike"

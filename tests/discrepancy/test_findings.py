@@ -46,6 +46,14 @@ def test_a_set_is_as_sure_as_its_members_together():
     assert said(0.1, "inertia") == perhaps
 
 
+def test_an_experiment_is_told_in_full_once():
+    lines = [FoundEffect("cogging", 0.5, ("external_torque",), {}, f"line {n}", "a slow turn") for n in (18, 36)]
+    first, second = Findings("explained", lines, GAIN).sentences()
+    assert "(told apart by a slow turn)" in first
+    assert "(told apart likewise)" in second
+    assert "line 36" in second
+
+
 def test_what_was_found_before_is_not_overwritten(tmp_path):
     """Least of all a plant file that an earlier run has extended, and that is examined further."""
     plant, record, found = resources.config("actuator.yaml"), tmp_path / "flight.csv", tmp_path / "found"
@@ -102,7 +110,7 @@ def test_sensors_of_the_loop_and_of_the_recorder_are_different_effects():
 
 
 @pytest.mark.parametrize(
-    ("others", "headline"), [((), "Explained."), (("inertia",), "Explained, but not by which of a set.")]
+    ("others", "headline"), [((), "Explained."), (("inertia",), "Explained, by one of several that fit alike.")]
 )
 def test_the_report_says_the_set_where_there_is_one(others, headline, tmp_path):
     effect = FoundEffect(
