@@ -40,9 +40,14 @@ def shipped_plant() -> Actuator:
 
 
 class Beside(LoadScopeScheduling):
-    """`make test`: the search for hidden effects beside all that shares clocks, ports and a multicast group."""
+    """`make test`: the search for hidden effects beside all that shares clocks, ports and a multicast group.
+
+    Attacks go file by file: each daemon has a bus and a folder of its own.
+    """
 
     def _split_scope(self, nodeid):
+        if nodeid.startswith("tests/adversary/"):
+            return nodeid.split("::")[0]
         return nodeid if nodeid.startswith("tests/discrepancy/") else "one by one"
 
 

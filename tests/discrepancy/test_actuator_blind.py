@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import yaml
-from click.testing import CliRunner
-from ema_postflight.discrepancy import discrepancy
 
-from ema.core import config, resources
-from ema.core.csv_records import write_csv
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.cycles import measured
@@ -26,7 +20,6 @@ from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.screening import promising, simulated
 from ema.discrepancy.actuator.search import Search, start_model
 from ema.discrepancy.actuator.verdicts import at_the_minimum
-from ema.models.actuator import Actuator
 
 
 def hide(hidden, n=3, seed=1, **flaws: float) -> Record:
@@ -65,36 +58,6 @@ def test_a_motion_that_was_recorded_once_is_held_out(hidden, shipped_plant):
     findings = examine(shipped_plant, measured(shipped_plant, [record])).findings
     assert findings.verdict == "adequate"
     assert findings.gain.k_before[0] == pytest.approx(0.04, abs=0.006)
-
-
-@pytest.mark.slow
-def test_magnet_flux_is_named_from_a_file_and_extends_the_plant(hidden, tmp_path):
-    """A weaker magnet reads as three shorted phases until it is named beside them; `extended.yaml` then holds it."""
-    write_csv(hide(hidden, flux=-0.06, k1=0.03), tmp_path / "flight.csv")
-    plant = str(resources.config("actuator.yaml"))
-    out = tmp_path / "found"
-    run = CliRunner().invoke(
-        discrepancy,
-        ["--plant", plant, str(tmp_path / "flight.csv"), "--out", str(out), "--json"],
-        catch_exceptions=False,
-    )
-    assert run.exit_code == 0
-    findings = json.loads((out / "findings.json").read_text())
-    assert findings["verdict"] == "explained"
-    assert [e["name"] for e in findings["effects"]] == ["magnet_flux"]
-    assert findings["effects"][0]["indistinguishable_from"] == ["k3 and k4 and k5 alike"]
-    assert findings["effects"][0]["parameters"]["change"]["value"] == pytest.approx(-0.06, abs=0.004)
-    assert min(findings["gain"]["k_before"][2:5]) > 0.04
-    assert max(findings["gain"]["k_after"][1:]) < 0.02
-    extended = config.load(out / "extended.yaml", Actuator)
-    assert extended.effects["magnet_flux"]["change"] == pytest.approx(-0.06, abs=0.004)
-    low, high = extended.intervals["magnet_flux"]["change"]
-    assert low < extended.effects["magnet_flux"]["change"] < high
-    assert yaml.safe_load((out / "extended.yaml").read_text())["kind"] == "ema"
-    report = (out / "report.html").read_text()
-    assert "One of 2 that fit alike" in report
-    assert "magnet flux changed by -6.0%" in report
-    assert "http" not in report.replace("http-equiv", "")
 
 
 @pytest.mark.slow

@@ -86,6 +86,27 @@ def before(folder, coarse_bundle):
     return err_k(ema(*words))
 
 
+def test_magnet_flux_is_named_from_a_file_and_extends_the_plant(folder):
+    """A weaker magnet reads as three shorted phases until it is named beside them; `extended.yaml` then holds it."""
+    out = folder / "found"
+    findings = json.loads((out / "findings.json").read_text())
+    assert findings["verdict"] == "explained"
+    assert [e["name"] for e in findings["effects"]] == ["magnet_flux"]
+    assert findings["effects"][0]["indistinguishable_from"] == ["k3 and k4 and k5 alike"]
+    assert findings["effects"][0]["parameters"]["change"]["value"] == pytest.approx(FLUX, abs=0.004)
+    assert min(findings["gain"]["k_before"][2:5]) > 0.04
+    assert max(findings["gain"]["k_after"][1:]) < 0.02
+    extended = config.load(out / "extended.yaml", Actuator)
+    assert extended.effects["magnet_flux"]["change"] == pytest.approx(FLUX, abs=0.004)
+    low, high = extended.intervals["magnet_flux"]["change"]
+    assert low < extended.effects["magnet_flux"]["change"] < high
+    assert yaml.safe_load((out / "extended.yaml").read_text())["kind"] == "ema"
+    report = (out / "report.html").read_text()
+    assert "One of 2 that fit alike" in report
+    assert "magnet flux changed by -6.0%" in report
+    assert "http" not in report.replace("http-equiv", "")
+
+
 @pytest.mark.parametrize("method", ["linear", "lf2", "lf1", "hf"])
 def test_estimates_become_better(folder, before, method):
     after = err_k(ema("identify", "--method", method, folder / "flight.csv", "--bundle", folder / "bundle", "--json"))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -107,7 +108,7 @@ def evidence(
         Those of each cause; all of a cause are there, with sizes of one width.
     """
     parameters = [*faults, *(p for cause in causes for p in cause)]
-    subsets, log_prior, P = _slabs(faults, causes)
+    subsets, log_prior, P = _slabs(tuple(p.usual for p in faults), tuple(tuple(p.usual for p in c) for c in causes))
     low, high = (np.array([getattr(p, end) - p.neutral for p in parameters]) for end in ("low", "high"))
     far = 1e6 * (1.0 + np.abs(at))
     low, high = np.maximum(low, -far), np.minimum(high, far)
@@ -155,10 +156,14 @@ def _within(log_z: Array, mean: Array, cov: Array, low: Array, high: Array) -> A
     return found
 
 
-def _slabs(faults: Sequence[Parameter], causes: Sequence[Sequence[Parameter]]) -> tuple[Array, Array, Array]:
-    """Subsets of faults (n, n_faults), log prior (n,), standard deviations of all parameters (n, p) by term."""
+@lru_cache(maxsize=64)
+def _slabs(faults: tuple[float, ...], causes: tuple[tuple[float, ...], ...]) -> tuple[Array, Array, Array]:
+    """Subsets of faults (n, n_faults), log prior (n,), standard deviations of all parameters (n, p) by term.
+
+    Of the usual sizes of faults, and of each cause's parameters.
+    """
     subsets, log_prior, P = [], [], []
-    usual = np.array([p.usual for p in faults])
+    usual = np.array(faults)
     for there in product((0.0, 1.0), repeat=len(faults)):
         any_fault = any(there)
         for fault_width, *widths in product(
@@ -168,7 +173,7 @@ def _slabs(faults: Sequence[Parameter], causes: Sequence[Sequence[Parameter]]) -
             weight += sum(np.log(WEIGHTS[w]) for w in widths)
             n = sum(there)
             weight += n * np.log(FAULT) + (len(faults) - n) * np.log1p(-FAULT)
-            sizes = [WIDTHS[w] * p.usual for w, cause in zip(widths, causes, strict=True) for p in cause]
+            sizes = [WIDTHS[w] * size for w, cause in zip(widths, causes, strict=True) for size in cause]
             subsets.append(there)
             log_prior.append(weight)
             P.append([*(WIDTHS[fault_width] * usual * there), *sizes])
