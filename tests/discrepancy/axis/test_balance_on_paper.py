@@ -55,7 +55,9 @@ def rows(m: Motion, torque=0.0, noise=0.0) -> Rows:
     y = mean @ m.known + noise * np.random.default_rng(0).standard_normal(n)
     block = np.arange(n) * 40 // n
     record = np.arange(n) * 2 // n
-    return Rows(m, y, mean @ m.drive, mean @ m.a, mean, mean * 0.0, block, np.ones(n, bool), record, np.ones(n), 0.01)
+    return Rows(
+        m, y, mean @ m.drive, mean @ m.a, mean, mean * 0.0, block, np.ones(n, bool), block, record, np.ones(n), 0.01
+    )
 
 
 def acting(m: Motion) -> Acting:

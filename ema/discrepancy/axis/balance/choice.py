@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ema.core.records import Array
-from ema.discrepancy.axis.noise import ESTIMATE_UNCERTAINTY
 
 from .along import LINES
 from .found import Balance, Term
 from .law import BY_RECORD, BY_RECORD_NAME, Law
 from .links import LINKS
+from .needed import Asked, families_held, is_needed
 from .regression import Corrected, Plain, Regression, fitted
 from .rows import Rows
 
 MOST_LAWS = 8
-CLEAR = 3.0  # deviations over blocks by which a law must foretell held-out blocks better
-MATTERS = 0.1  # share of what is left that a law must take
-LEAST = 3e-4  # share of the drive's torque in power that a law must take, where more is left than it takes
 SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
 N_DRAWS = 400  # of blocks, to see how often a law wins
 
@@ -28,17 +26,18 @@ def chosen(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence[Law]
     """Forward and backward selection beside the laws that are `given`."""
     n = int(found.whole.sum())
     drive = float(np.var(found.drive[found.whole]))
+    asked = Asked.of(drive * n, every)
     base = fitted(found, plain, given)
     model, declared = base, {law.key for law in given}
     while len(model.laws) < MOST_LAWS:
         trials = _trials(found, plain, model, every)
-        best = _simplest(trials, drive * n)
-        if best is None or not _is_needed(best, model, drive * n):
+        best = _simplest(trials, asked)
+        if best is None or not is_needed(best, model, asked):
             break
-        model = _revised(found, plain, best, every, drive * n)
-    while (fewer := _exchanged(found, plain, model, every, drive * n)) is not None:
+        model = _revised(found, plain, best, every, asked)
+    while (fewer := _exchanged(found, plain, model, every, asked)) is not None:
         model = fewer
-    terms = tuple(_term(found, plain, model, law, every) for law in model.laws if law.key not in declared)
+    terms = tuple(_term(found, plain, model, law, every, asked) for law in model.laws if law.key not in declared)
     return Balance(
         model, Corrected(model.coefficients, model.covariance()), plain, terms, drive,
         float(np.mean((found.y - plain.inertia * found.alpha)[found.whole] ** 2)),
@@ -47,20 +46,20 @@ def chosen(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence[Law]
     )  # fmt: skip
 
 
-def _simplest(trials: Sequence[Regression], whole: float) -> Regression | None:
+def _simplest(trials: Sequence[Regression], asked: Asked) -> Regression | None:
     """The trial that leaves least; of two of which one holds the other, the larger only where it needs to be."""
     best = min(trials, key=lambda r: r.loss, default=None)
     if best is None:
         return None
-    held = [r for r in trials if r.laws[-1].family in _held(best.laws[-1].family)]
-    return next((r for r in held if not _is_needed(best, r, whole)), best)
+    held = [r for r in trials if r.laws[-1].family in families_held(best.laws[-1].family)]
+    return next((r for r in held if not is_needed(best, r, asked)), best)
 
 
 def _trials(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) -> list[Regression]:
     """The model with one law more: of each family that is not in it the member that fits best."""
     have = {law.key for law in model.laws}
     single = {law.family for law in model.laws if law.family not in LINES}
-    single |= {other for law in model.laws for other in _held(law.family) if other not in LINES}
+    single |= {other for law in model.laws for other in families_held(law.family) if other not in LINES}
     have |= {law.key.removesuffix(BY_RECORD) for law in model.laws}
     members: dict[str, list[Law]] = {}
     for law in every:
@@ -72,16 +71,6 @@ def _trials(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) 
 def _with(model: Regression, law: Law) -> list[Law]:
     """The laws of a model and one more; that one by record takes the place of the same for all."""
     return [*(own for own in model.laws if law.repeats is None or own.key != law.repeats.key), law]
-
-
-HOLDS = {"spring": ("constant",), LINKS: ("pendulum",)}  # a spring has its own zero
-
-
-def _held(family: str) -> tuple[str, ...]:
-    """Families that one of another family holds: with own coefficients by record, also those of one for all."""
-    shared = family.removesuffix(BY_RECORD)
-    held = HOLDS.get(shared, ())
-    return held if family == shared else (shared, *held, *(f"{other}{BY_RECORD}" for other in held))
 
 
 def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
@@ -98,55 +87,38 @@ def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
     return members[int(np.argmax(gains))]
 
 
-def _is_needed(new: Regression, old: Regression, whole: float) -> bool:
-    """Clearly better over blocks, by a share of what is left that matters, and of the drive's torque.
-
-    The latter since no law has quite the right form: beside a rest, what is small may be a part of it. That is no
-    doubt of a law that takes most of what is more than noise.
-    """
-    d = old.losses - new.losses
-    gain = float(d.sum())
-    votes = d / (old.losses + float(np.mean(old.losses)))  # no block may outvote all others
-    clear = float(votes.sum()) > CLEAR * float(np.sqrt(len(d)) * np.std(votes))
-    if not clear or gain < MATTERS * old.loss:
-        return False
-    noise = float(np.sum(old.rows.sigma[old.rows.whole] ** 2))
-    is_seen = old.loss > (1.0 + 2.0 * ESTIMATE_UNCERTAINTY) * noise
-    return gain > LEAST * whole or (is_seen and new.loss - noise < 0.5 * gain)
-
-
-def _revised(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], whole: float) -> Regression:
+def _revised(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], asked: Asked) -> Regression:
     """Without laws that later ones made superfluous, or with another in their place that does clearly better."""
     for law in model.laws[:-1]:
         if law.family in (*LINES, LINKS):
             continue  # lines stand beside each other, and a neighbour is declared
         without = fitted(found, plain, [own for own in model.laws if own.key != law.key])
-        if not _is_needed(model, without, whole):
+        if not is_needed(model, without, asked):
             model = without
             continue
-        other = _simplest(_trials(found, plain, without, every), whole)
-        if other is not None and other.laws[-1].key != law.key and _is_needed(other, model, whole):
+        other = _simplest(_trials(found, plain, without, every), asked)
+        if other is not None and other.laws[-1].key != law.key and is_needed(other, model, asked):
             model = other
     return model
 
 
-def _exchanged(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], whole: float) -> Regression | None:
+def _exchanged(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], asked: Asked) -> Regression | None:
     """A model of fewer laws that leaves no more: one law may do what several stood in for."""
     single = [law for law in model.laws if law.family not in (*LINES, LINKS)]
     for trial in _trials(found, plain, model, every) if len(single) > 1 else ():
         reduced = trial
         for law in single:
             without = fitted(found, plain, [own for own in reduced.laws if own.key != law.key])
-            if not _is_needed(reduced, without, whole):
+            if not is_needed(reduced, without, asked):
                 reduced = without
-        if len(reduced.laws) < len(model.laws) and not _is_needed(model, reduced, whole):
+        if len(reduced.laws) < len(model.laws) and not is_needed(model, reduced, asked):
             return reduced
-        if len(reduced.laws) == len(model.laws) and _is_needed(reduced, model, whole):
+        if len(reduced.laws) == len(model.laws) and is_needed(reduced, model, asked):
             return reduced
     return None
 
 
-def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequence[Law]) -> Term:
+def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequence[Law], asked: Asked) -> Term:
     """How sure a law is beside all that could stand in its place."""
     without = fitted(found, plain, [own for own in model.laws if own.key != law.key])
     others = [r for r in _trials(found, plain, without, every) if r.laws[-1].key != law.key]
@@ -158,7 +130,7 @@ def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequenc
     rivals: dict[str, Array] = {}
     for r in [*others, *same]:
         own = r.laws[-1].name.removesuffix(BY_RECORD_NAME)
-        if law.family in _held(r.laws[-1].family) and not _is_needed(r, model, 0.0):
+        if law.family in families_held(r.laws[-1].family) and not is_needed(r, model, replace(asked, whole=0.0)):
             continue  # it can do what this law does and more, and need not
         if own != law.name.removesuffix(BY_RECORD_NAME) and (own not in rivals or r.loss < float(rivals[own].sum())):
             rivals[own] = r.losses

@@ -40,14 +40,15 @@ def rows(
     """
     widths = halves or half_widths(courses)
     total = sum(float(np.ptp(c.t)) for c in courses if not c.static) or 1.0
-    length = max(total / N_BLOCKS, 4.0 * max(widths.values(), default=0.0))
+    widest = max(widths.values(), default=0.0)
+    length, short = max(total / N_BLOCKS, 4.0 * widest), max(total / N_BLOCKS, 2.0 * widest)
     n_rows = {c.record: 0.0 for c in courses}
     for c in courses:
         n_rows[c.record] += len(c.t) if c.static else 2.0 * float(np.ptp(c.t)) / widths[c.record]
     thin = max(1.0, sum(n_rows.values()) / MAX_ROWS)
     names = list(dict.fromkeys(c.record for c in courses))
     model = plant.model({})
-    motions, pieces, matrices, derivatives, offset, block = [], [], [], [], 0, 0
+    motions, pieces, matrices, derivatives, offset, block, piece = [], [], [], [], 0, 0, 0
     for c in courses:
         motion = at_rest(plant, model, c) if c.static else moving(plant, model, c, widths[c.record])
         motions.append(motion)
@@ -57,20 +58,22 @@ def rows(
             slopes = csr_array(matrix.shape)
             centres = np.arange(matrix.shape[0])
             alpha, own, whole = np.zeros(len(centres)), np.full(len(centres), block), np.ones(len(centres), bool)
+            cluster = np.full(len(centres), piece)
             sigma = np.full(len(centres), c.noise["drive"] * _per_drive(plant, c) / max(1, round(thin)) ** 0.5)
         else:
             matrix, slopes, alpha, centres, sigma = _weak(plant, c, motion, widths[c.record], thin, unsure)
             place = (c.t[centres] - c.t[0]) / length
             own = block + place.astype(int)
+            cluster = piece + ((c.t[centres] - c.t[0]) / short).astype(int)
             near = np.abs(place - np.round(place)) * length
             whole = (near > widths[c.record]) | (place < 0.5) | (length < 4.0 * widths[c.record])
         if len(centres):
-            block = int(own.max()) + 1
-        pieces.append((alpha, own, whole, np.full(len(centres), names.index(c.record)), sigma))
+            block, piece = int(own.max()) + 1, int(cluster.max()) + 1
+        pieces.append((alpha, own, whole, cluster, np.full(len(centres), names.index(c.record)), sigma))
         matrices.append((matrix, offset, n))
         derivatives.append((slopes, offset, n))
         offset += n
-    alpha, own, whole, record, sigma = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    alpha, own, whole, cluster, record, sigma = (np.concatenate(column) for column in zip(*pieces, strict=True))
     if len(alpha) < FEWEST:
         return None
     join = _stacked(matrices, offset)
@@ -79,7 +82,7 @@ def rows(
     _, own = np.unique(own, return_inverse=True)
     half = float(np.median(list(widths.values()))) if widths else 0.0
     known, drive, slopes = join @ motion.known, join @ motion.drive, _stacked(derivatives, offset)
-    return Rows(motion, known, drive, alpha, join, slopes, own, whole, record, sigma, half)
+    return Rows(motion, known, drive, alpha, join, slopes, own, whole, cluster, record, sigma, half)
 
 
 def _weak(

@@ -26,6 +26,8 @@ class Rows:
         ∫ φ f dt and -∫ φ' f dt of what is known at the samples.
     block : array of int, shape (n_rows,)
         Which block a row lies in. Rows that lie across two have a `whole` of False: they are fitted, not held out.
+    cluster : array of int, shape (n_rows,)
+        The same in shorter pieces: rows of two of them have next to nothing in common.
     sigma : array, shape (n_rows,)
         Noise of y - J α at the plant file's inertia.
     half : float
@@ -40,6 +42,7 @@ class Rows:
     differentiate: csr_array
     block: NDArray[np.int_]
     whole: NDArray[np.bool_]
+    cluster: NDArray[np.int_]
     record: NDArray[np.int_]
     sigma: Array
     half: float
