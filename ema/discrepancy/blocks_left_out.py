@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from .plant import Array
+from ema.core.records import Array
 
 
 def covariance(gram: Array, blocks: Iterable[tuple[Array, Array]], least: float = 1e-12) -> Array:

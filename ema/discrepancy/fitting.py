@@ -9,8 +9,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ema.core.records import Array
+
 from . import blocks_left_out as left_out
-from .plant import Array, Free, Plant, Point
+from .plant import Free, Plant, Point
 
 HUBER = 4.0  # residuals beyond this many scales count linearly: a window that diverges must not decide a fit
 WILD = 20.0  # and beyond this many they all count the same when models are compared

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .plant import Array
+from ema.core.records import Array
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from ema.core.records import Array
 
-Array = NDArray[np.float64]
 Point = Mapping[str, float]  # values of free parameters by name; what is not named is neutral
 
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ema.core.records import Array
+
 from .fitting import Fit, best_fit, fit, jacobian, log_likelihood, scale_of
-from .plant import Array, Block, Candidate, Plant, Point
+from .plant import Block, Candidate, Plant, Point
 
 N_FOLDS = 2
 FEW = 4  # parameters up to which all of them are differenced in every iteration

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from .plant import Array
+from ema.core.records import Array
 
 FALSE_ALARMS = 0.005  # of all tests together
 GROUPS = (1, 8, 64)  # samples averaged before a chi-square: the time scales looked at

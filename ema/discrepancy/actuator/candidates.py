@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ema.core.names import FAULTS
+from ema.core.records import Array
 from ema.discrepancy.plant import Point
 from ema.effects import registry
 from ema.models.actuator import Actuator
 
-from .features import Array
 from .free import Free, free
 from .gear import Resonance
 from .measured import Measured

@@ -7,10 +7,10 @@ from scipy.optimize import nnls
 
 from ema.core.errors import RecordError
 from ema.core.names import CURRENTS
-from ema.core.records import Cycle
+from ema.core.records import Array, Cycle
 from ema.models.actuator import Actuator
 
-from .features import Array, Signals, motor_torque, reference, reference_terms
+from .features import Signals, motor_torque, reference, reference_terms
 
 MAX_LAG = 6e-3  # [s] no sensor or loop of this plant is that late; channels are apart
 MAX_CLIPPED = 0.1  # share of samples at the largest value

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ema.core.records import Array
 from ema.models.actuator import Actuator
 
-from .features import Array, Signals, local_mean, motor_torque, roughness
+from .features import Signals, local_mean, motor_torque, roughness
 
 WITHIN = 1.3  # factor by which noise may differ from the plant file's before it is replaced
 SMOOTH = 101  # samples over which a user position is taken as straight but for noise

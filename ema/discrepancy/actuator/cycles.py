@@ -8,14 +8,14 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ema.core.names import CURRENTS, FAULTS
-from ema.core.records import Cycle, Record, require
+from ema.core.records import Array, Cycle, Record, require
 from ema.effects.base import T_REFERENCE
 from ema.models.actuator import Actuator
 from ema.models.envelope import envelope
 from ema.models.turns import nearest_turn
 
 from .checks import check_rate, check_signals
-from .features import Array, Signals, features, stacked
+from .features import Signals, features, stacked
 from .measured import Measured
 from .sampling import between, positions_every
 from .zeros import zero_apart

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ema.core.names import FAULTS
+from ema.core.records import Array
 from ema.discrepancy.engine.contest import EXPANSIONS, Contest, Entrant, Outcome
 from ema.discrepancy.engine.statistic import Whitening
 
-from .features import Array
 from .fit import columns
 from .free import K_FREE, Free
 from .noise import SEED, Noise

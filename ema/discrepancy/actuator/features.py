@@ -24,13 +24,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, vectorize
-from numpy.typing import NDArray
 
+from ema.core.records import Array
 from ema.effects.trapezoid import sector, six_step, trap
 from ema.models import jit  # noqa: F401  where compiled functions are kept
 from ema.models.actuator import Actuator
-
-Array = NDArray[np.float64]
 
 SECOND_DIFFERENCE = np.sqrt(6.0)  # rms of x[t] - 2 x[t-1] + x[t-2] over that of white x
 SECTORS = 24  # per electrical turn

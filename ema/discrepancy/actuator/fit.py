@@ -9,9 +9,9 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ema.core.names import FAULTS
+from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
-from .features import Array
 from .free import K_STEP, Free
 from .noise import Noise, disagreement, scatter
 from .plant import EmaPlant, Steps

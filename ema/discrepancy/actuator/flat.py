@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
-from .features import Array
 from .fit import Fit, bounded, bounds, concluded, moved, residuals_at, stacked_jacobian
 from .free import Free
 from .noise import Noise

@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit
 from scipy.optimize import least_squares, minimize
 
+from ema.core.records import Array
 from ema.effects.backlash import deflection
 from ema.effects.dry_friction import rubbing_speed_after
 from ema.faults import backlash
@@ -27,7 +28,6 @@ from ema.models.actuator import Actuator
 
 from .features import (
     GROUPS,
-    Array,
     acceleration,
     current_lag,
     delayed,

@@ -15,11 +15,11 @@ from dataclasses import replace
 import numpy as np
 
 from ema.core.names import FAULTS
+from ema.core.records import Array
 from ema.discrepancy.plant import Point
 from ema.effects import registry
 
 from .candidates import WARMER
-from .features import Array
 from .fit import N_SEEDS, Columns, Fit, fit, residuals, stacked_jacobian
 from .free import K_FREE, Free, free
 from .noise import scatter

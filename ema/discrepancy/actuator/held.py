@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ema.core.records import Array
 from ema.effects.backlash import follow
-
-from .features import Array
 
 PLAYS = np.concatenate([[0.0], np.geomspace(1e-3, 1.0, 20)])  # k2 that are tried
 

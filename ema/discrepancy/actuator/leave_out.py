@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ema.core.records import Array
 from ema.discrepancy.folds import Folds, dealt
 from ema.discrepancy.plant import Point
 
-from .features import Array
 from .fit import SEED, bounded, bounds, columns, moved, residuals, stacked_jacobian
 from .plant import ENVELOPE_STEP, EmaPlant
 from .search import FINAL_SEED, N_FINAL, N_GLANCE, Model, Search

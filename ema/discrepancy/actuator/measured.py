@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .features import Array, Signals
+from ema.core.records import Array
+
+from .features import Signals
 
 
 @dataclass(frozen=True)

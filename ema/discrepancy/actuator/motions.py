@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ema.core.records import Array
 from ema.models.actuator import Actuator
-
-from .features import Array
 
 FAST, SLOW = 0.25, 0.03  # shares of the speed without load, V_dc / (2 k_e)
 AWAY = 0.25  # of the travel, from where it was recorded

@@ -9,12 +9,11 @@ import numpy as np
 
 from ema.core.errors import RecordError
 from ema.core.names import CURRENTS, FAULTS
-from ema.core.records import Cycle, Record
+from ema.core.records import Array, Cycle, Record
 from ema.models import hf
 
 from .comparators import take_step
 from .cycles import measured
-from .features import Array
 from .fit import columns, stacked_jacobian
 from .motions import Motion, motions
 from .noise import Noise

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import gamma
 
+from ema.core.records import Array
 from ema.discrepancy.engine.statistic import shrunk_correlation
 from ema.discrepancy.plant import Point
 
-from .features import Array
 from .measured import Measured
 from .plant import EmaPlant
 from .runs import Runs

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ema.core.names import FAULTS
+from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
 from .comparators import PLAIN, take_step
-from .features import Array
 from .forward import CLOSE, exchanged, grown, instead_of_all
 from .growing import is_steady
 from .noise import Noise, Verdict

@@ -9,12 +9,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ema.core.records import Array
 from ema.discrepancy.plant import Point
 from ema.discrepancy.report import Picture, picture
 from ema.effects.base import T_REFERENCE
 
 from .examination import Examination
-from .features import GROUPS, SECTORS, Array
+from .features import GROUPS, SECTORS
 from .leave_out import settled
 from .plant import ENVELOPE_STEP
 from .search import FINAL_SEED, N_FINAL

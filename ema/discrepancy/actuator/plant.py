@@ -13,13 +13,14 @@ from functools import cached_property
 import numpy as np
 
 from ema.core.names import FAULTS, PHASES
+from ema.core.records import Array
 from ema.discrepancy.plant import Point
 from ema.effects import registry
 from ema.models import hf
 from ema.models.actuator import Actuator
 from ema.models.layout import STATE
 
-from .features import Array, Signals, features, floors, slices, stacked
+from .features import Signals, features, floors, slices, stacked
 from .gear import Resonance, resonance
 from .measured import Measured
 from .runs import Asked, Memory, Runs, Work

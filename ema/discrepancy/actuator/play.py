@@ -13,11 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ema import faults
+from ema.core.records import Array
 from ema.discrepancy.findings import Findings
 from ema.models import jit  # noqa: F401  where compiled functions are kept
 from ema.models.actuator import Actuator
 
-from .features import GROUPS, Array, load_torque, local_mean, motor_torque, spacing
+from .features import GROUPS, load_torque, local_mean, motor_torque, spacing
 from .held import PLAYS, pressed_user
 from .measured import Measured
 

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ema.core.names import FAULTS
+from ema.core.records import Array
 from ema.discrepancy.engine.hypothesis import Block, Cause, Parameter, Point
 from ema.effects import registry
 
 from .candidates import Candidate
-from .features import Array
 from .plant import EmaPlant
 
 K_USUAL = 0.05  # of a fault that is worth an alarm

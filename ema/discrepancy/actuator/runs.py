@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ema.core.records import Array
 from ema.models import parts
-
-from .features import Array
 
 MOST = 6_000  # runs that are remembered: some 100 MB
 

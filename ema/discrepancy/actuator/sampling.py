@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import UnivariateSpline
 
-from .features import Array
+from ema.core.records import Array
 
 RATES = (50, 40, 25, 20, 10, 8, 5, 4, 2)  # samples from one position to the next
 STRAIGHT = 1e-9  # [rad] by which a line may be bent by rounding

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ema.core.names import FAULTS
+from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
 from .candidates import Candidate, candidates
-from .features import Array
 from .fit import SEED, bounded, bounds, moved, residuals, stacked_jacobian
 from .free import Free
 from .search import FAR, N_GLANCE, N_GLANCE_FAR, Model, Search, stripped

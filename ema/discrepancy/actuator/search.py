@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ema.core.records import Array
 from ema.discrepancy.plant import Point
 from ema.discrepancy.progress import Progress
 
 from .candidates import Candidate
-from .features import Array
 from .fit import N_SEEDS, SEED, Columns, Fit, columns, fit, residuals, residuals_at, with_short_steps
 from .flat import settled
 from .free import K_FREE, Free

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .features import Array
+from ema.core.records import Array
+
 from .weak import Torque, line, lines, share_explained
 
 N_BINS = 12

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .features import GROUPS, SETTLING, Array, Signals, local_mean, spacing
+from ema.core.records import Array
+
+from .features import GROUPS, SETTLING, Signals, local_mean, spacing
 
 ORDERS = np.arange(1.0, 120.0, 0.1)
 MOVING = 2.0  # [rad/s] below, dry friction takes up what it likes

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ema.core.records import Array
 from ema.models.actuator import Actuator
 
-from .features import Array, Signals, roughness
+from .features import Signals, roughness
 
 CLOSED = 0.5  # [rad] of the rotor after it has turned round, from where the play is taken up
 STIFF = 1.5  # times the noise of θ_u that θ_m/GR - θ_u may vary by while the play is closed, with a stiff gear
