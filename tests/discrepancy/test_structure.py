@@ -9,8 +9,8 @@ import pytest
 from tools.imports import circle, imports, longest_chain, untested
 
 TESTS = Path(__file__).parent.parent
-LONGEST_CHAIN = 14  # modules; wanted: 8
-UNTESTED = 41  # wanted: none
+LONGEST_CHAIN = 12  # modules; wanted: 8
+UNTESTED = 31  # wanted: none
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,8 @@
 
 `cycles` checks and groups the records (`measured`); `features` reduces a cycle to balances that feel physics; `plant`
 simulates the cycles at any point of faults and effects, each run once (`runs`); `noise` says what two runs differ by,
-and whether a residual is more; `fit` is Gauss–Newton on simulated means, and a `search` keeps the models that were
-fitted. `weak` and `candidates` say what to try, `screening` what it promises and what would do the same; `structure`,
+and whether a residual is more; `fit` is Gauss–Newton on simulated means, and a `search` keeps each fitted `model`.
+`weak` and `candidates` say what to try, `screening` what it promises and what would do the same; `structure`,
 `controller` and `repeating` describe what is left, `examine` is the whole run, `pictures` shows it. Of the run, `paths`
 are its ways, `forward` fits the best of them, `weighing` says whether one is real, `verdicts` makes sure, `simpler`
 prefers fewer causes, such as one instead of several faults, `telling` puts the model into findings. Before it `checks`

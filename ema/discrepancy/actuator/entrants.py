@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,9 +13,12 @@ from ema.discrepancy.engine.statistic import Whitening
 
 from .fit import columns
 from .free import K_FREE, Free
+from .model import Model
 from .noise import SEED, Noise
 from .problem import ActuatorProblem, as_cause
-from .search import Model, Search
+
+if TYPE_CHECKING:
+    from .search import Search
 
 RUNS = 1_000  # seeds of a motion's noise, at most
 OTHERS = 4  # sets of effects that are weighed beside faults alone, the answer and what is in it

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from ema.discrepancy.findings import Findings
 
+from .model import Model
 from .noise import Verdict
-from .search import Model, Search
+from .search import Search
 
 
 @dataclass(frozen=True)

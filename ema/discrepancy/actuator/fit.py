@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -14,7 +15,9 @@ from ema.discrepancy.plant import Point
 
 from .free import K_STEP, Free
 from .noise import Noise, disagreement, scatter
-from .plant import EmaPlant, Steps
+
+if TYPE_CHECKING:
+    from .plant import EmaPlant, Steps
 
 N_SEEDS = 8  # at least, while searching
 N_COLUMN = 12  # seeds of a column of the Jacobian

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +22,9 @@ from ema.discrepancy.plant import Point
 from .fit import Fit, bounded, bounds, concluded, moved, residuals_at, stacked_jacobian
 from .free import Free
 from .noise import Noise
-from .plant import EmaPlant
+
+if TYPE_CHECKING:
+    from .plant import EmaPlant
 
 FLAT = 0.3  # length of a direction over that of the longest, below which it is simulated itself
 N_SEEDS = 8  # of each half

@@ -6,17 +6,21 @@ Of those that promise most the best few are fitted, with what resembles them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from ema.core.names import FAULTS
 
 from .comparators import PLAIN, take_step
 from .fit import fit
+from .model import CHANCE, FAR, Model
 from .noise import Noise, Verdict
 from .ridge import walked
 from .screening import AT_LEAST, Screened, looking_like, promising, simulated, start_with
-from .search import CHANCE, FAR, Model, Search
 from .verdicts import NEARLY, as_on_the_bench, at_the_minimum, surely
 from .weighing import SAME, SLACK, WORTH_IT, does_it, is_alike, is_credible, is_enough, may_be_nothing
+
+if TYPE_CHECKING:
+    from .search import Search
 
 MAX_EFFECTS = 3
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already

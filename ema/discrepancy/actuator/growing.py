@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,8 +23,11 @@ from ema.effects import registry
 from .candidates import WARMER
 from .fit import N_SEEDS, Columns, Fit, fit, residuals, stacked_jacobian
 from .free import K_FREE, Free, free
+from .model import Model
 from .noise import scatter
-from .search import Model, Search
+
+if TYPE_CHECKING:
+    from .search import Search
 
 DIFFER = 1.5  # times what noise makes of the differences between cycles of one motion
 TOLD = 0.01  # range of a fault from which it is said to change

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +13,11 @@ from ema.discrepancy.folds import Folds, dealt
 from ema.discrepancy.plant import Point
 
 from .fit import SEED, bounded, bounds, columns, moved, residuals, stacked_jacobian
+from .model import FINAL_SEED, N_FINAL, N_GLANCE, Model
 from .plant import ENVELOPE_STEP, EmaPlant
-from .search import FINAL_SEED, N_FINAL, N_GLANCE, Model, Search
+
+if TYPE_CHECKING:
+    from .search import Search
 
 N_FOLDS = 8  # at most; of more cycles several are left out together
 ENVELOPE_SETTLING = 15e-3  # [s]

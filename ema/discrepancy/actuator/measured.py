@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ema.core.records import Array
 
-from .features import Signals
+if TYPE_CHECKING:
+    from .features import Signals
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,10 +15,13 @@ from ema.models import hf
 from .comparators import take_step
 from .cycles import measured
 from .fit import columns, stacked_jacobian
+from .model import Model
 from .motions import Motion, motions
 from .noise import Noise
 from .plant import EmaPlant
-from .search import Model, Search
+
+if TYPE_CHECKING:
+    from .search import Search
 
 N_CYCLES = 4  # of the motion that is recommended
 N_EACH = 24  # runs of each half: two halves, so that noise of means does not look like a difference

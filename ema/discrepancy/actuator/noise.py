@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -13,10 +14,12 @@ from ema.core.records import Array
 from ema.discrepancy.engine.statistic import shrunk_correlation
 from ema.discrepancy.plant import Point
 
-from .measured import Measured
-from .plant import EmaPlant
 from .runs import Runs
 from .thinning import spread
+
+if TYPE_CHECKING:
+    from .measured import Measured
+    from .plant import EmaPlant
 
 N_RUNS = 96, 48  # for the covariance, for the null distribution
 N_RUNS_SURE = 288, 192  # where it is close

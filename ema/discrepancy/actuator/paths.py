@@ -11,9 +11,10 @@ from ema.discrepancy.plant import Point
 from .comparators import PLAIN, take_step
 from .forward import CLOSE, exchanged, grown, instead_of_all
 from .growing import is_steady
+from .model import CHANCE, DISTANT, Model
 from .noise import Noise, Verdict
 from .plant import EmaPlant
-from .search import CHANCE, DISTANT, Model, Search, start_model
+from .search import Search, start_model
 from .simpler import simpler
 from .timing import samples_late
 from .verdicts import FAULT_ALARM, NEARLY, as_on_the_bench, surely

@@ -17,8 +17,8 @@ from ema.effects.base import T_REFERENCE
 from .examination import Examination
 from .features import GROUPS, SECTORS
 from .leave_out import settled
+from .model import FINAL_SEED, N_FINAL
 from .plant import ENVELOPE_STEP
-from .search import FINAL_SEED, N_FINAL
 from .thinning import spread
 from .weak import ORDERS, Torque, line, share_explained, torque
 

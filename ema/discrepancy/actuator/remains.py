@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ema.discrepancy.folds import Folds
 from ema.discrepancy.grade import Left, Verdict, graded
 
 from .candidates import Candidate
 from .leave_out import over_folds
+from .model import Model
 from .noise import Verdict as Test
-from .search import Model, Search
 from .weighing import is_enough
+
+if TYPE_CHECKING:
+    from .search import Search
 
 
 @dataclass(frozen=True)

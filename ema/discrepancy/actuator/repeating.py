@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ema.discrepancy.plant import Point
 
 from .fit import residuals
-from .search import FINAL_SEED, N_FINAL, Search
+from .model import FINAL_SEED, N_FINAL
+
+if TYPE_CHECKING:
+    from .search import Search
 
 SELDOM = 0.8  # share that repeats, below which that is worth a sentence; what always acts alike has 0.98 and more
 FEWEST = 2.0  # misfit from which chance does not decide it

@@ -7,14 +7,19 @@ own, which no step by slopes leaves. So the ridge is walked, and a fit begins wh
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ema.discrepancy.plant import Point
 
 from .candidates import Candidate
 from .fit import fit
+from .model import Model
 from .screening import start_with
-from .search import Model, Search
+
+if TYPE_CHECKING:
+    from .search import Search
 
 N_SHARES = 8  # of the ridge
 

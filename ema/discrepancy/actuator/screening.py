@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,10 @@ from ema.discrepancy.plant import Point
 from .candidates import Candidate, candidates
 from .fit import SEED, bounded, bounds, moved, residuals, stacked_jacobian
 from .free import Free
-from .search import FAR, N_GLANCE, N_GLANCE_FAR, Model, Search, stripped
+from .model import FAR, N_GLANCE, N_GLANCE_FAR, Model, stripped
+
+if TYPE_CHECKING:
+    from .search import Search
 
 N_PROBE, N_PROBE_HIDDEN = 8, 24  # seeds of a column that only screens; of one that is hardly felt
 WIDER = 3.0  # times the step of an effect that is hardly felt

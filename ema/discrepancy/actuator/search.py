@@ -15,45 +15,10 @@ from .candidates import Candidate
 from .fit import N_SEEDS, SEED, Columns, Fit, columns, fit, residuals, residuals_at, with_short_steps
 from .flat import settled
 from .free import K_FREE, Free
+from .model import FAR, FINAL_SEED, N_FINAL, N_GLANCE, Model, stripped
 from .noise import Noise, Verdict, verdict
 from .plant import EmaPlant, Steps
 from .weak import Torque, torque
-
-N_FINAL = 16  # seeds of a mean that is judged
-FINAL_SEED = 3_000_000
-N_GLANCE, N_GLANCE_FAR = 4, 2  # seeds that tell a good start from a bad one; where a hundred times their noise is left
-K_SEEN = 0.01  # a fault that is there
-CHANCE = 0.03  # difference in misfit that seeds make
-FAR = 100.0  # excess from which candidates are simulated before they are ranked
-DISTANT = 10.0  # excess of a model that is far from the data
-
-
-@dataclass
-class Model:
-    """A fitted model and how it does on held-out cycles.
-
-    `heldout` is the sum of squares over what noise makes of it: one where nothing is left to explain.
-    """
-
-    effects: tuple[Candidate, ...]
-    fit: Fit
-    heldout: float
-    by: Noise | None = None  # the noise that `heldout` is measured by
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the effects."""
-        return tuple(c.effect for c in self.effects)
-
-    @property
-    def excess(self) -> float:
-        """What is left on held-out cycles beyond noise."""
-        return max(self.heldout - 1.0, 0.0)
-
-    def shows_faults_of(self, effect: Candidate) -> bool:
-        """Whether all of the several faults that an effect can be mistaken for are seen."""
-        faults = effect.faults
-        return len(faults) > 1 and all(self.fit.point.get(name, 0.0) > K_SEEN for name in faults)
 
 
 @dataclass
@@ -189,14 +154,6 @@ class Search:
                 n += len(r[at])
                 total += len(r[at]) * float(np.log1p(np.mean(r[at] ** 2)))
         return n * float(np.expm1(total / n))
-
-
-def stripped(model: Model, effect: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:
-    """Effects, free parameters and point of a model without one of its effects."""
-    own = {f.name for f in effect.frees}
-    point = {name: x for name, x in model.fit.point.items() if not name.startswith(f"{effect.effect}.")}
-    effects = tuple(c for c in model.effects if c != effect)
-    return effects, tuple(f for f in model.fit.free if f.name not in own), point
 
 
 def start_model(search: Search, faults: Point) -> Model:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +14,14 @@ from ema.effects import registry
 
 from .candidates import Candidate, candidates, resolver_zero
 from .free import Free
+from .model import CHANCE, K_SEEN, Model, stripped
 from .noise import Noise, Verdict
 from .screening import looking_like, probed, promising, start_with
-from .search import CHANCE, K_SEEN, Model, Search, stripped
 from .verdicts import NEARLY
 from .weighing import ALIKE, DOUBTFUL, SAME, is_alike, is_credible, is_enough
+
+if TYPE_CHECKING:
+    from .search import Search
 
 HOPELESS = 5.0  # held-out misfit after a few steps from which an effect in place of faults is given up
 ONE_CAUSE = 0.25  # relative spread up to which several parameters are one cause

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,13 +19,16 @@ from .entrants import as_told
 from .extension import as_extension
 from .fit import SEED, Fit
 from .leave_out import over_folds, square
+from .model import CHANCE, FINAL_SEED, N_FINAL, Model
 from .noise import SEED as NOISE_SEED
 from .noise import Verdict
 from .remains import Remains, remains
-from .search import CHANCE, FINAL_SEED, N_FINAL, Model, Search
 from .structure import structure
 from .verdicts import FAULT_ALARM
 from .weighing import WORTH_IT, is_enough
+
+if TYPE_CHECKING:
+    from .search import Search
 
 IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
 FORM = 0.5  # of a value, for a rest as large as the whole effect: the interval holds what would take all of the rest

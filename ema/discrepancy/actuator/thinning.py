@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .measured import Measured
+if TYPE_CHECKING:
+    from .measured import Measured
+
 
 MOST = 24  # cycles that are examined; with more, the library's own approximations are what is left
 BY_CYCLE = ("motion", "start", "speed", "user_speed", "holding", "dT", "faults")

@@ -7,12 +7,15 @@ sample late. Nothing in the actuator is, but 0.1 ms are a current of 0.1 A, and 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from ema.discrepancy.plant import Point
 
 from .fit import excess_at
-from .noise import Noise
-from .plant import EmaPlant
+
+if TYPE_CHECKING:
+    from .noise import Noise
+    from .plant import EmaPlant
 
 TRIED = (-2, -1, 1, 2)  # samples
 CLEAR = 0.1  # share of what is left that a shift may leave; a sensor's delay, which looks alike, leaves more

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .comparators import CLEAR, PLAIN, find_step, take_step
+from .model import CHANCE, DISTANT, Model
 from .noise import N_RUNS_SURE, Noise, Verdict
-from .search import CHANCE, DISTANT, Model, Search
 from .timing import samples_late
+
+if TYPE_CHECKING:
+    from .search import Search
 
 FAULT_ALARM = 0.02  # a fault that an operator would be told of
 PHASES = ("_a", "_b", "_c")

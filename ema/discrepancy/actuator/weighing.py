@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ema.effects import registry
 from ema.effects.base import ABSENT
 
-from .candidates import Candidate
-from .search import CHANCE, DISTANT, Model, Search
+from .model import CHANCE, DISTANT, Model
+
+if TYPE_CHECKING:
+    from .candidates import Candidate
+    from .search import Search
 
 SAME = 0.05  # difference in held-out misfit up to which fewer causes are preferred
 WORTH_IT = 0.25  # share of what is left that a further effect must take on held-out cycles

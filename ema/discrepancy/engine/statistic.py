@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import gamma
 
-from .hypothesis import Array, Block
-from .records import Simulated
+if TYPE_CHECKING:
+    from .hypothesis import Array, Block
+    from .records import Simulated
 
 RECORDS_PER_DIRECTION = 3  # simulated records for each statistic whose covariance they tell
 FAINT = 1e-2  # length of a direction over the longest, below which no candidate moves it apart from others
