@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ema.core.records import Array
-
 from . import blocks_left_out as left_out
-from .plant import Free, Plant, Point
+
+if TYPE_CHECKING:
+    from ema.core.records import Array
+
+    from .plant import Free, Plant, Point
 
 HUBER = 4.0  # residuals beyond this many scales count linearly: a window that diverges must not decide a fit
 WILD = 20.0  # and beyond this many they all count the same when models are compared

@@ -23,9 +23,10 @@ not noise                  anything else                                      un
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from .folds import Folds
+if TYPE_CHECKING:
+    from .folds import Folds
 
 Verdict = Literal["adequate", "explained", "partly explained", "unexplained", "unfinished"]
 UPPER = 1.645  # deviations, that an estimate exceeds with a probability of 5 %

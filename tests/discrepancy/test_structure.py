@@ -9,7 +9,7 @@ import pytest
 from tools.imports import circle, imports, longest_chain, untested
 
 TESTS = Path(__file__).parent.parent
-LONGEST_CHAIN = 12  # modules; wanted: 8
+LONGEST_CHAIN = 8  # modules
 UNTESTED = 31  # wanted: none
 
 

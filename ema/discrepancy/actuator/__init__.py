@@ -10,35 +10,3 @@ prefers fewer causes, such as one instead of several faults, `telling` puts the 
 refuses, `conditions`, `comparators`, `timing`, `sampling`, `play` and `zeros` read what is no flaw of the actuator,
 `growing` whether its faults change.
 """
-
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from pathlib import Path
-
-from ema.core.records import Record
-from ema.discrepancy.findings import Findings
-from ema.discrepancy.progress import Progress
-from ema.discrepancy.report import Picture
-from ema.identification.alignment import aligned
-from ema.models import actuator_file
-
-
-def discrepancy(
-    plant_file: Path, records: Sequence[Record], say: Progress
-) -> tuple[Findings, Callable[[], list[Picture]]]:
-    """Findings on records of the actuator in `plant_file`, and what draws their pictures."""
-    from .cycles import measured
-    from .examine import examine
-    from .pictures import pictures
-
-    plant = actuator_file.load(plant_file)
-    read = [aligned(record, plant) for record in records]
-    notes = [note for _, own in read for note in own]
-    for note in notes:
-        say(note)
-    records = [record for record, _ in read]
-    examination = examine(plant, measured(plant, records), say=say)
-    findings = examination.findings
-    return replace(findings, notes=[*notes, *findings.notes]), lambda: pictures(examination)

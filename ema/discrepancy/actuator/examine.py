@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from ema.core.errors import RecordError
+from ema.core.records import Record
+from ema.discrepancy.findings import Findings
 from ema.discrepancy.progress import Progress
+from ema.discrepancy.report import Picture
+from ema.identification.alignment import aligned
+from ema.models import actuator_file
 from ema.models.actuator import Actuator
 
 from .conditions import as_recorded
+from .cycles import measured
 from .entrants import weighed
 from .examination import Examination
 from .gear import swinging
@@ -131,3 +139,19 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
     findings.notes.extend(conditions)
     findings = with_friction(stated, plant, findings)
     return Examination(findings, search, before, after, path.verdict_before, v)
+
+
+def discrepancy(
+    plant_file: Path, records: Sequence[Record], say: Progress
+) -> tuple[Findings, Callable[[], list[Picture]]]:
+    """Findings on records of the actuator in `plant_file`, and what draws their pictures."""
+    from .pictures import pictures
+
+    plant = actuator_file.load(plant_file)
+    read = [aligned(record, plant) for record in records]
+    notes = [note for _, own in read for note in own]
+    for note in notes:
+        say(note)
+    examination = examine(plant, measured(plant, [record for record, _ in read]), say=say)
+    findings = examination.findings
+    return replace(findings, notes=[*notes, *findings.notes]), lambda: pictures(examination)

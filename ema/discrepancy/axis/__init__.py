@@ -27,29 +27,3 @@
 `plant`         all of it as the engine's `Plant`
 ==============  =====================================================================================
 """
-
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
-from pathlib import Path
-
-from ema.core.records import Record
-from ema.discrepancy.findings import Findings
-from ema.discrepancy.progress import Progress
-from ema.discrepancy.report import Picture
-
-
-def discrepancy(
-    plant_file: Path, records: Sequence[Record], say: Progress
-) -> tuple[Findings, Callable[[], list[Picture]]]:
-    """Findings on records of the axis in `plant_file`, and what draws their pictures."""
-    from ema.models import axis_config
-
-    from .between import examined
-    from .pictures import pictures
-    from .plant import AxisPlant
-    from .wording import findings
-
-    plant = AxisPlant(axis_config.load(plant_file), records)
-    outcome = examined(plant, say)
-    return findings(plant, outcome), lambda: pictures(plant, outcome)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from ema.core.records import Array, Record
-from ema.discrepancy.plant import Free, Point
-from ema.models import axis
-from ema.models.axis_config import Axis
+if TYPE_CHECKING:
+    from ema.core.records import Array, Record
+    from ema.discrepancy.plant import Free, Point
+    from ema.models import axis
+    from ema.models.axis_config import Axis
 
-from .naming import Numbers
-from .windows import Bench, Window
+    from .naming import Numbers
+    from .windows import Bench, Window
 
 
 @dataclass(frozen=True)

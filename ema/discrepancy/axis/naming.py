@@ -13,11 +13,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ema.discrepancy.plant import Point
 from ema.models.axis_config import INSTANCE, LINES
+
+if TYPE_CHECKING:
+    from ema.discrepancy.plant import Point
 
 PARAMETERS = ("J", "M", "C", "F_d", "k_t", "k_e", "R", "L")
 

@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import csr_array
 
-from ema.core.records import Array
-from ema.discrepancy.plant import Point
 from ema.models import axis
 from ema.models.axis_layout import row
 
-from .windows import Bench, Window
-
 if TYPE_CHECKING:
+    from ema.core.records import Array
+    from ema.discrepancy.plant import Point
+
     from .measured import Measured
+    from .windows import Bench, Window
 
 HALF_WIDTHS = (3, 5, 8, 12, 20, 32, 50)  # of a test function, in samples
 FEWEST, MAX_ROWS = 30, 2500  # test functions with which regressions are worth it, and with which they stay quick

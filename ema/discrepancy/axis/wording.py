@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
+from ema.core.records import Record
 from ema.discrepancy import findings as shared
 from ema.discrepancy.grade import graded
 from ema.discrepancy.outcome import Outcome
+from ema.discrepancy.progress import Progress
+from ema.discrepancy.report import Picture
 from ema.effects import registry
+from ema.models import axis_config
 from ema.models.axis_config import LinearAxis
 
 from . import ripple, stamps
@@ -16,6 +22,7 @@ from .agreeing import together
 from .balance.as_effects import effects, point
 from .balance.found import Balance
 from .balance.telling import sentences, told
+from .between import examined
 from .closed_loop import closed_loop
 from .dropped import dropped
 from .external import with_external
@@ -29,6 +36,17 @@ ALONE = (
     "balance knows both"
 )
 MOVED = 0.02  # of the plant file's friction: less is not worth a word
+
+
+def discrepancy(
+    plant_file: Path, records: Sequence[Record], say: Progress
+) -> tuple[shared.Findings, Callable[[], list[Picture]]]:
+    """Findings on records of the axis in `plant_file`, and what draws their pictures."""
+    from .pictures import pictures
+
+    plant = AxisPlant(axis_config.load(plant_file), records)
+    outcome = examined(plant, say)
+    return findings(plant, outcome), lambda: pictures(plant, outcome)
 
 
 def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ema.core.records import Array
 from ema.models.axis_config import LinearAxis
 
 from .cogging import integer_orders, scan
@@ -19,6 +18,8 @@ from .measured import Zero
 from .weak_form import FEWEST, thinned, weak_form
 
 if TYPE_CHECKING:
+    from ema.core.records import Array
+
     from .measured import Measured
 
 SAME = 0.98  # of the best overlap: a zero that reaches it is as good, the smallest is taken

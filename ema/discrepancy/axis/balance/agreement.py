@@ -11,7 +11,6 @@ Cochran, "The combination of estimates from different experiments", Biometrics 1
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -146,10 +145,3 @@ def _square(d: Array, V: Array) -> float:
 
 def _log_likelihood(d: Array, V: Array) -> float:
     return -0.5 * (_square(d, V) + float(np.linalg.slogdet(V)[1]))
-
-
-def against(law: Law, found: Sequence[Agreement]) -> float:
-    """Factor on the confidence of a law by what the records say of it: 1 where they agree, or may differ."""
-    key = law.key.removesuffix(BY_RECORD)
-    own = (a for a in found if a.law is not None and a.law.key.removesuffix(BY_RECORD) == key)
-    return min((a.odds for a in own if not a.why), default=1.0)

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ema.core.records import Array, Cycle
-from ema.discrepancy.axis.windows import Bench
 from ema.effects.base import T_REFERENCE
 
 if TYPE_CHECKING:
+    from ema.core.records import Array, Cycle
     from ema.discrepancy.axis.measured import Measured
+    from ema.discrepancy.axis.windows import Bench
 
 LATE = {"held": 0.5, "held before": -0.5}  # samples, by what the drive does between them
 MOST = 60_000  # samples of all cycles together; of longer ones means of neighbours are taken

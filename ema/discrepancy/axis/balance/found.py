@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from .agreement import Agreement, against
-from .law import Law
-from .regression import Corrected, Plain, Regression
+from .law import BY_RECORD
+
+if TYPE_CHECKING:
+    from .agreement import Agreement
+    from .law import Law
+    from .regression import Corrected, Plain, Regression
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,13 @@ class Balance:
         """
         rest = term.common * max(self.left - self.noise, 0.0)
         sure = term.wins * term.power / (term.power + rest) if term.power > 0.0 else 0.0
-        return sure * against(term.law, self.agreements)
+        return sure * self._agreed(term.law)
+
+    def _agreed(self, law: Law) -> float:
+        """Factor on the confidence of a law by what records say of it: 1 where they agree, or may differ."""
+        key = law.key.removesuffix(BY_RECORD)
+        own = (a for a in self.agreements if a.law is not None and a.law.key.removesuffix(BY_RECORD) == key)
+        return min((a.odds for a in own if not a.why), default=1.0)
 
     def of_set(self, term: Term) -> float:
         """Confidence in a law or one of those that do as well."""

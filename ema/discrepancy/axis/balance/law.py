@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
 
 from ema.core.records import Array
 
-from .motion import Motion
+if TYPE_CHECKING:
+    from .motion import Motion
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,7 @@ class Acting:
 BY_RECORD = " by record"  # in family and key of what is fitted once for each
 BY_RECORD_NAME = "_by_record"  # in its name
 
-Columns = Callable[[Motion, Acting], tuple[Array, ...]]
+Columns: TypeAlias = "Callable[[Motion, Acting], tuple[Array, ...]]"
 Values = Callable[[Array], Mapping[str, float]]
 
 

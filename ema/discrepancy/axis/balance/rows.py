@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ema.core.records import Array
+if TYPE_CHECKING:
+    from ema.core.records import Array
 
-from .law import Acting, Law
-from .motion import Motion
+    from .law import Acting, Law
+    from .motion import Motion
 
 
 @dataclass(frozen=True)
