@@ -12,21 +12,21 @@ from .held_out import by_record, over_folds, residual_over_folds, training_gain
 from .outcome import Gain, Outcome
 from .plant import Plant
 from .progress import Progress
-from .rounds import State, judged, leave_out, revise, select, without_terms
+from .rounds import Reread, State, judged, leave_out, never, revise, select, without_terms
 from .selection import FORM, above_noise, alike, base_model, compare, is_nameless
 from .trust import told_effects, without_unlikely
 
 MIMICKED = 0.02  # of an effect's mark in power, where less is left of it beside the base parameters it cannot be seen
 
 
-def examine(plant: Plant, progress: Progress | None = None) -> Outcome:
-    """Examine a plant with its records."""
+def examine(plant: Plant, progress: Progress | None = None, reread: Reread | None = None) -> Outcome:
+    """Examine a plant with its records; `reread` says where these are to be taken another way (`rounds.State`)."""
     progress = progress or Progress()
     everything = list(range(len(plant.blocks)))
     progress("nominal model")
     plain = base_model(plant)
     progress.fitted((), plain.rms, plain.fits[0].point)
-    state = State(plain, plain, [], [])
+    state = State(plain, plain, [], [], reread=reread or never)
     notes: list[str] = []
     select(plant, state, progress)
     revise(plant, state, progress)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from .grade import LIMIT
 from .plant import Candidate, Plant, Point
 from .progress import Progress
-from .selection import FORM, Tried, above_noise, choice, compare, fit_model, is_worth_it, one_more
+from .selection import FORM, Tried, above_noise, base_model, choice, compare, fit_model, is_worth_it, one_more
 from .verdict import Verdict, judge
 
 MAX_EFFECTS = 3
@@ -20,9 +20,21 @@ MANY = 12  # free parameters from which an effect is revised beside its stronges
 N_RIVALS = 6
 
 
+Reread = Callable[[Tried, Tried], bool]
+"""Reads the records another way where a model then foretells them better than one with a further effect does."""
+
+
+def never(model: Tried, further: Tried) -> bool:
+    """Records that can be taken one way only."""
+    return False
+
+
 @dataclass
 class State:
-    """Models without effects and so far, and for each accepted effect the trials in its place and the model without."""
+    """Models without effects and so far, and for each accepted effect the trials in its place and the model without.
+
+    `reread` weighs a condition of the records against a further effect; where it says so, the selection begins again.
+    """
 
     plain: Tried
     model: Tried
@@ -30,6 +42,7 @@ class State:
     tried: list[dict[str, Any]]
     n_rounds: int = 0
     library_only: bool = False  # no nameless terms
+    reread: Reread = never
     immaterial: str = ""  # what ended the selection by taking less than matters
 
 
@@ -60,6 +73,11 @@ def select(plant: Plant, state: State, progress: Progress) -> None:
         best = choice(trials, state.model) if trials else None
         if best is None or not is_worth_it(trials[best], state.model):
             return
+        if state.reread(state.model, trials[best]):
+            state.plain = state.model = base_model(plant)
+            state.rounds.clear()
+            begun_anew_with = -1
+            continue
         candidate = trials[best].accepted[-1]
         if candidate.is_structure and is_explained(plant, state.plain, state.model):
             return  # what the wrong form of a law leaves needs no cause of its own
@@ -91,7 +109,7 @@ def without_terms(plant: Plant, state: State, progress: Progress) -> State:
     if not any(c.is_structure for c in state.model.accepted):
         return state
     progress("effects of the library alone")
-    other = State(state.plain, state.plain, [], state.tried, state.n_rounds, library_only=True)
+    other = State(state.plain, state.plain, [], state.tried, state.n_rounds, library_only=True, reread=state.reread)
     select(plant, other, progress)
     revise(plant, other, progress)
     few = len(other.model.accepted) <= len(state.model.accepted) + 1

@@ -18,7 +18,7 @@ from ema.discrepancy.examine import examine
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Point
 from ema.discrepancy.progress import Progress
-from ema.discrepancy.selection import Tried, above_noise, base_model, compare
+from ema.discrepancy.selection import Tried, above_noise, base_model, compare, refitted
 from ema.discrepancy.verdict import judge
 
 from .plant import AxisPlant
@@ -43,7 +43,8 @@ def examined(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
         return examine(plant, progress)
     progress("the drive between samples")
     plant.between = _of_plain(plant)
-    outcome = examine(plant, progress)
+    reread = _Reread(plant, progress)
+    outcome = examine(plant, progress, reread)
     here = plant.between
     there = _beside(plant, outcome)
     if there == here:
@@ -51,10 +52,12 @@ def examined(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     if there != here:
         progress(f"again, with a drive that is {there} between samples")
         plant.between = there
-        other = examine(plant, progress)
+        other = examine(plant, progress, reread)
+        there = plant.between
         alike = plant.plant.drive == "speed-loop" and _alike(other, outcome)
         if _is_simpler(other, outcome):
             outcome, other = other, outcome
+            plant.between = there
         else:
             plant.between = here
         if alike:
@@ -66,6 +69,34 @@ def examined(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     if plant.between in SAID:
         outcome.notes.append(SAID[plant.between])
     return outcome
+
+
+class _Reread:
+    """Takes the drive another way where this alone foretells more than the best further effect (`rounds.Reread`).
+
+    What a drive does between samples has no parameter to fit: the one with the larger gain on held-out parts is it. A
+    speed loop is left as it is (`_doubted`): acting faster is as good as any inertia.
+    """
+
+    def __init__(self, plant: AxisPlant, progress: Progress) -> None:
+        self._plant, self._progress, self._refuted = plant, progress, set[str]()
+
+    def __call__(self, model: Tried, further: Tried) -> bool:
+        plant, here = self._plant, self._plant.between
+        if plant.plant.drive == "speed-loop":
+            return False
+        tried = {}
+        for way in set(LATE) - {here} - self._refuted:
+            plant.between = way
+            self._progress(f"a drive that is {way} between samples")
+            tried[way] = refitted(plant, model)
+        plant.between = here
+        best = max(tried, key=lambda way: compare(tried[way], model).gain, default=here)
+        if best == here or not compare(tried[best], model).is_clear or compare(tried[best], further).gain < 0.0:
+            return False
+        self._refuted.add(here)
+        plant.between = best
+        return True
 
 
 def _doubted(plant: AxisPlant, outcome: Outcome) -> str:
