@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from .grade import LIMIT
@@ -34,6 +34,7 @@ class State:
     """Models without effects and so far, and for each accepted effect the trials in its place and the model without.
 
     `reread` weighs a condition of the records against a further effect; where it says so, the selection begins again.
+    `unlikely` are rows of what was considered and is less likely than not (`Findings.rejected`).
     """
 
     plain: Tried
@@ -43,6 +44,7 @@ class State:
     n_rounds: int = 0
     library_only: bool = False  # no nameless terms
     reread: Reread = never
+    unlikely: list[dict[str, Any]] = field(default_factory=list)
     immaterial: str = ""  # what ended the selection by taking less than matters
 
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from .fitting import Fit
-from .plant import Candidate, Free, Plant
+from .fitting import WILD, Fit
+from .plant import Array, Candidate, Free, Plant
 from .progress import Progress
 from .rounds import State, is_explained, judged, leave_out
 from .selection import FORM, Tried, above_noise, alike, best_of, compare, is_nameless
 
-UNLIKELY = 0.1  # odds of an effect with all that the data cannot tell from it, below which it is not named
+NAMED = 0.5  # probability of an effect with all that the data cannot tell from it, from which it is named
 
 
 def without_unlikely(plant: Plant, state: State, progress: Progress) -> dict[str, float]:
@@ -32,11 +33,13 @@ def without_unlikely(plant: Plant, state: State, progress: Progress) -> dict[str
                 no_cause = not explained and leans_in_a_fold(state.model, k)
                 odds[c.key] = 0.0 if no_cause else trust[c.key] * sum(weights[key] for key in told)
         worst = min(odds, key=lambda key: odds[key], default=None)
-        if worst is None or odds[worst] >= UNLIKELY:
+        if worst is None or odds[worst] >= NAMED:
             return trust
         progress(f"without {worst}, which is unlikely")
         k = [c.key for c in state.model.accepted].index(worst)
-        state.model = leave_out(plant, state.model, {k})
+        without = leave_out(plant, state.model, {k})
+        state.unlikely.append(_unlikely(worst, odds[worst], without, state.model))
+        state.model = without
         del state.rounds[k]
 
 
@@ -86,7 +89,7 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
 
     The mark of an effect is what the mean square of the held-out residual loses by it. Beside it stand what is left
     unexplained, what only nameless terms explain, and what the other effects' laws may miss by having the wrong form:
-    any of them may be what the effect is mistaken for.
+    any of them may be what the effect is mistaken for. Of the last, as much as looks like it (`_looks_like`).
     """
     accepted = state.model.accepted
     terms = {k for k, c in enumerate(accepted) if c.is_structure}
@@ -94,19 +97,41 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
         return {}
     nameless = leave_out(plant, state.model, terms) if terms else state.model
     unknown = 0.0 if judged(plant, nameless).is_noise else above_noise(nameless)
-    marks = {
-        c.key: max(above_noise(before) - above_noise(state.model), 0.0)
-        for c, (_, before) in zip(accepted, state.rounds, strict=True)
-        if not c.is_structure
-    }
+    befores = {c.key: of[1] for c, of in zip(accepted, state.rounds, strict=True) if not c.is_structure}
+    marks = {key: max(above_noise(before) - above_noise(state.model), 0.0) for key, before in befores.items()}
+    made = {key: _differences(before, state.model) for key, before in befores.items()}
     trust = {}
     for key, mark in marks.items():
-        others = sum(marks.values()) - mark
-        trust[key] = mark / (mark + unknown + FORM**2 * others) if mark > 0.0 else 0.0
+        form = sum(FORM**2 * marks[o] * _looks_like(made[key], made[o]) for o in marks if o != key)
+        trust[key] = mark / (mark + unknown + form) if mark > 0.0 else 0.0
     for c in accepted:
         if c.key in trust and _leans(state.model.fits[0], c):
             trust[c.key] *= 0.5
     return trust
+
+
+def _unlikely(key: str, odds: float, without: Tried, model: Tried) -> dict[str, Any]:
+    """What was considered and is less likely than not, for findings.json (`Findings.rejected`)."""
+    gain = compare(model, without)
+    why = (
+        f"held-out parts are {gain.gain:.1f} ± {gain.error:.1f} nats likelier with it, and it is less likely than not "
+        f"({odds:.0%}, with all that the data cannot tell from it): what it takes, the form of other laws or what "
+        "stays unexplained may make"
+    )
+    unknown = dict.fromkeys(("nats", "nats_error", "nats_of"))
+    return {"name": key, "before": without.rms, "after": model.rms, **unknown, "why": why}
+
+
+def _differences(before: Tried, model: Tried) -> list[Array]:
+    """What an effect does to each block, beside all that may be fitted in its place."""
+    pairs = zip(before.held_out, model.held_out, strict=True)
+    return [np.clip(a - b, -WILD, WILD).ravel() for a, b in pairs]
+
+
+def _looks_like(one: Sequence[Array], other: Sequence[Array]) -> float:
+    """Share in power of what one effect does that another would make, were its law of another strength by block."""
+    both = sum(float(a @ b) ** 2 / float(b @ b) for a, b in zip(one, other, strict=True) if b.any())
+    return both / max(sum(float(a @ a) for a in one), 1e-300)
 
 
 def _weights(trials: dict[str, Tried], before: Tried) -> dict[str, float]:

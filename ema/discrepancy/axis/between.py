@@ -18,7 +18,7 @@ from ema.discrepancy.examine import examine
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Point
 from ema.discrepancy.progress import Progress
-from ema.discrepancy.selection import Tried, above_noise, base_model, compare, refitted
+from ema.discrepancy.selection import ODDS, Tried, above_noise, base_model, compare, refitted
 from ema.discrepancy.verdict import judge
 
 from .plant import AxisPlant
@@ -79,22 +79,22 @@ class _Reread:
     """
 
     def __init__(self, plant: AxisPlant, progress: Progress) -> None:
-        self._plant, self._progress, self._refuted = plant, progress, set[str]()
+        self._plant, self._progress, self._turns = plant, progress, len(LATE)
 
     def __call__(self, model: Tried, further: Tried) -> bool:
         plant, here = self._plant, self._plant.between
-        if plant.plant.drive == "speed-loop":
+        if plant.plant.drive == "speed-loop" or self._turns == 0:
             return False
         tried = {}
-        for way in set(LATE) - {here} - self._refuted:
+        for way in [way for way in LATE if way != here]:
             plant.between = way
             self._progress(f"a drive that is {way} between samples")
             tried[way] = refitted(plant, model)
         plant.between = here
-        best = max(tried, key=lambda way: compare(tried[way], model).gain, default=here)
-        if best == here or not compare(tried[best], model).is_clear or compare(tried[best], further).gain < 0.0:
+        best = max(tried, key=lambda way: compare(tried[way], model).gain)
+        if compare(tried[best], model).gain < ODDS or compare(tried[best], further).gain < 0.0:
             return False
-        self._refuted.add(here)
+        self._turns -= 1
         plant.between = best
         return True
 
