@@ -42,6 +42,8 @@ class Fit:
     blocks : tuple of int
     scale : float
         Robust scale of the residual, at least 1 (= noise).
+    by_noise : array, shape (n_free, n_free)
+        What the covariance would be were noise all that is left.
     """
 
     free: tuple[Free, ...]
@@ -50,6 +52,7 @@ class Fit:
     covariance: Array
     blocks: tuple[int, ...]
     scale: float
+    by_noise: Array
 
     @property
     def loss(self) -> float:
@@ -154,6 +157,12 @@ class _Objective:
         Js, own = J * self.scales, self.prior_slopes * self.scales
         return Js.T @ (weight[:, None] * Js) + own.T @ own, Js.T @ (weight * r) + own.T @ self.prior(x)
 
+    def by_noise(self, J: Array) -> Array:
+        """Covariance of the free parameters, were noise all that is left."""
+        Js, own = J * self.scales, self.prior_slopes * self.scales
+        found = np.linalg.pinv(Js.T @ Js + own.T @ own, rcond=1e-12, hermitian=True)
+        return np.asarray(found * np.outer(self.scales, self.scales))
+
     def covariance(self, J: Array, residuals: Sequence[Array], scale: float) -> Array:
         """Of the free parameters, where residuals have this scale; each as wide as blocks disagree on it, at least."""
         Js = J * self.scales
@@ -210,7 +219,8 @@ def fit(
             break
         J = of.slopes(x, r)
     scale = scale_of(residuals)
-    return Fit(of.free, of.at(x), residuals, of.covariance(J, residuals, scale), of.blocks, scale)
+    covariance = of.covariance(J, residuals, scale)
+    return Fit(of.free, of.at(x), residuals, covariance, of.blocks, scale, of.by_noise(J))
 
 
 def _step(A: Array, g: Array, damping: float, moving: NDArray[np.bool_]) -> Array:

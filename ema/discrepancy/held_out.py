@@ -8,7 +8,7 @@ import numpy as np
 
 from .folds import Folds
 from .outcome import Gain, RecordGain
-from .plant import Errors, Plant
+from .plant import Errors, Fitted, Plant
 from .selection import Tried, training
 
 N_PARTS = 20  # at most, of all records together; neighbouring stretches of one record make one
@@ -64,7 +64,7 @@ def _errors(plant: Plant, model: Tried, blocks: set[int]) -> list[Errors]:
     found = []
     for (_, left_out), fitted in zip(training(plant), model.fits, strict=True):
         if own := [j for j in left_out if j in blocks]:
-            found.append(plant.errors(fitted.point, own))
+            found.append(plant.errors(fitted.point, own, Fitted(fitted.free, fitted.by_noise)))
     return found
 
 

@@ -88,6 +88,14 @@ class Errors:
     weight: float = 1.0
 
 
+@dataclass(frozen=True)
+class Fitted:
+    """Parameters that were fitted, with the covariance that noise alone gives them, shape (n_free, n_free)."""
+
+    free: tuple[Free, ...]
+    covariance: Array
+
+
 class Plant(Protocol):
     """A plant with its records, see the package's description."""
 
@@ -118,8 +126,8 @@ class Plant(Protocol):
         """Terms the residual suggests, best first."""
         ...
 
-    def errors(self, point: Point, blocks: Sequence[int]) -> Errors:
-        """Error of the simulation and its noise floor."""
+    def errors(self, point: Point, blocks: Sequence[int], fitted: Fitted | None = None) -> Errors:
+        """Error of the simulation and its noise floor, which holds what noise made of the parameters at `point`."""
         ...
 
     def describe(

@@ -10,6 +10,8 @@ import pytest
 from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.between import examined
 from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.fitting import fit
+from ema.discrepancy.plant import Fitted
 from ema.models.axis_config import RotaryAxis
 
 ACTS_BETWEEN = "the speed loop acts between the samples of the record too"
@@ -59,3 +61,29 @@ def test_a_drive_with_a_clock_of_its_own_adds_up_to_a_delay(servo):
 def test_an_inertia_of_half_a_thousandth_is_no_cause(servo):
     outcome = look(servo, servo.SPEED_LOOP, samples=True, inertia=1.0005 * 0.0085)
     assert outcome.verdict == "adequate"
+
+
+def test_a_drive_that_is_held_is_no_clock_of_its_own(support):
+    """Late by half a sample throughout, which a clock that is late by one at the end comes near to."""
+    geared = support("geared")
+    axis = geared.Axis(J=1.24e-4, F=0.018, C=7.6e-4, warms=(20.0, 45.0, 3.0))
+    record = geared.record(axis, 42, seconds=7.0, temperature=True)
+    outcome = examined(AxisPlant(RotaryAxis.model_validate(geared.plant(axis)), [record]))
+    assert outcome.verdict == "adequate"
+    assert outcome.effects == []
+    assert any("each value is held until the next" in note for note in outcome.notes)
+
+
+def test_what_noise_makes_of_parameters_is_no_error_of_the_simulation(servo):
+    """The floor rises by the mean square of what drawn parameters do to a free run."""
+    plant = AxisPlant(RotaryAxis.model_validate(servo.CURRENT), [servo.record(1, position=True, seconds=3.0)])
+    blocks = range(len(plant.blocks))
+    F_d = fit(plant, plant.base, {f.name: f.start for f in plant.base}, blocks)
+    wide = Fitted(F_d.free, 100.0 * F_d.by_noise)
+    sharp, loose = (plant.errors(F_d.point, blocks, of) for of in (None, wide))
+    sd = np.sqrt(np.diag(wide.covariance))
+    moved = [plant.errors({**F_d.point, F_d.free[0].name: F_d.point[F_d.free[0].name] + s * sd[0]}, blocks).error ** 2
+             for s in (-1.0, 1.0)]  # fmt: skip
+    assert len(F_d.free) == 1
+    assert loose.error == sharp.error
+    assert loose.noise_floor**2 - sharp.noise_floor**2 == pytest.approx(np.mean(moved) - sharp.error**2, rel=0.05)

@@ -56,7 +56,7 @@ class Toy:
     def structure(self, point, blocks):
         return []
 
-    def errors(self, point, blocks):
+    def errors(self, point, blocks, fitted=None):
         r = np.concatenate([x.ravel() for x in self.residuals([point], blocks)[0]])
         return Errors(float(np.sqrt(np.mean(r**2))), QUIET, float(len(r)))
 

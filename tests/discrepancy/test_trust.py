@@ -1,20 +1,28 @@
-"""What folds find with other parameters is judged by each fold's own."""
+"""How far an effect stands out: beside laws of another form, and where folds have other parameters."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ema.discrepancy.fitting import Fit
-from ema.discrepancy.plant import Candidate, Free
+from ema.discrepancy.plant import Block, Candidate, Free
+from ema.discrepancy.progress import Progress
+from ema.discrepancy.rounds import State
 from ema.discrepancy.selection import Tried
-from ema.discrepancy.trust import leans_in_a_fold
+from ema.discrepancy.trust import leans_in_a_fold, without_unlikely
+
+N_BLOCKS, N = 12, 200
+LARGE, SMALL = (
+    3.0,
+    0.3,
+)  # what effects do to the residual, over noise: less than a sixth of the larger one's is its form
 
 
 def line(order, value):
     """A line of torque, and a fit of it."""
     free = Free(f"cogging:{order}.cos", "N m", -1.0, 1.0, 0.1, 0.1)
     candidate = Candidate("cogging", "cogging", (free,), ({free.name: 0.1},))
-    return candidate, Fit((free,), {free.name: value}, [], np.eye(1), (0,), 1.0)
+    return candidate, Fit((free,), {free.name: value}, [], np.eye(1), (0,), 1.0, np.eye(1))
 
 
 def tried(*lines):
@@ -28,3 +36,57 @@ def test_a_line_that_another_fold_has_at_another_order_is_looked_up_there():
 
 def test_a_law_that_ends_at_its_bound_in_one_fold_leans():
     assert leans_in_a_fold(tried(line(16, 0.2), line(12, 1.0)), 0)
+
+
+class Columns:
+    """A plant whose effects are columns, by block; `acting` is what its record holds beside noise."""
+
+    noise_uncertainty = 0.0
+    base = ()
+    structure = candidates = errors = describe = describe_structure = None
+
+    def __init__(self, columns, acting):
+        self.blocks = [Block(str(j), "record", N, stretch=j) for j in range(N_BLOCKS)]
+        self.columns = columns
+        self.y = np.random.default_rng(1).standard_normal((N_BLOCKS, N)) + acting
+
+    def residuals(self, points, blocks):
+        return [
+            [(self.y[j] - sum(x * self.columns[name][j] for name, x in point.items()))[None] for j in blocks]
+            for point in points
+        ]
+
+    def tried(self, *names):
+        """The model with these effects, each as large as its column is."""
+        candidates = [Candidate(n, n, (Free(n, "1", -5.0, 5.0, 1.0, 0.1),), ({n: 1.0},)) for n in names]
+        point = {n: 1.0 for n in names}
+        held_out = self.residuals([point], range(N_BLOCKS))[0]
+        free = tuple(c.free[0] for c in candidates)
+        fit = Fit(free, point, held_out, np.eye(len(free)), tuple(range(N_BLOCKS)), 1.0, np.eye(len(free)))
+        return Tried(tuple(candidates), (fit, fit), (tuple(candidates),) * 2, tuple(held_out))
+
+
+def named(small, acting):
+    """What stays of a large effect with a small one beside it, and what was considered."""
+    large = LARGE * np.random.default_rng(2).standard_normal((N_BLOCKS, N))
+    columns = {"large": large, "small": small(large)}
+    plant = Columns(columns, large + acting(large, columns["small"]))
+    both = plant.tried("large", "small")
+    rounds = [({"large": both}, plant.tried("small")), ({"small": both}, plant.tried("large"))]
+    state = State(plant.tried(), both, rounds, [])
+    trust = without_unlikely(plant, state, Progress())
+    return trust, [row["name"] for row in state.unlikely]
+
+
+def test_a_small_effect_that_looks_like_no_other_law_is_as_sure_as_it_stands_out():
+    other = SMALL * np.random.default_rng(3).standard_normal((N_BLOCKS, N))
+    trust, unlikely = named(lambda large: other, lambda large, small: small)
+    assert trust["small"] > 0.9
+    assert unlikely == []
+
+
+def test_what_another_law_would_make_were_it_stronger_in_some_blocks_is_told_as_considered():
+    late = (np.arange(N_BLOCKS) >= N_BLOCKS // 2)[:, None]
+    trust, unlikely = named(lambda large: 0.1 * late * large, lambda large, small: small)
+    assert list(trust) == ["large"]
+    assert unlikely == ["small"]

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from ema.core.records import Array
 from ema.models.axis_config import Axis
 
 from .whitening import Filter, design, open_loop_variance
-from .windows import START_NOISE, Bench, Window, speed_noise
+from .windows import HALF, START_NOISE, Bench, Window, speed_noise
 
 TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
 FIRST, FIRST_PART = 12, 4  # samples at least, and share of a window, to which its start state is fitted
@@ -55,7 +56,10 @@ def whitener(p: Axis, b: Bench, w: Window) -> Filter:
 
 
 def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseModel:
-    """Noise of a window; with `turning`, also of the moment at which friction turns round."""
+    """Noise of a window. The moment at which friction turns round is known as well as the smoothed speed shows it.
+
+    With `turning` not better than `TURNING` around it: a residual that is weighed by its noise must not rest on it.
+    """
     kind = b.roles.kind
     k_t = 1.0 if kind == "force" else float(p.k_t or 1.0)
     k_e, R, L, J = float(p.k_e or 0.0), max(float(p.R or 0.0), 1e-9), float(p.L or 0.0), p.inertia
@@ -90,8 +94,13 @@ def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseM
     at_rest = np.abs(w.speed) < 3.0 * START_NOISE * speed_noise(b.roles, b.noise, w.period)
     process = np.where(at_rest & np.roll(at_rest, 1) & np.roll(at_rest, -1), 0.0, process)
     turns = np.diff(np.where(at_rest, 0.0, np.sign(w.speed)), prepend=np.sign(w.speed[0])) != 0.0
-    turns |= np.roll(turns, -1) | np.roll(turns, 1)
-    process = np.where(turns & turning, np.hypot(process, TURNING * 2.0 * float(p.F_s or p.F_d) / J), process)
+    stops = maximum_filter1d(np.abs(acceleration), 2 * HALF + 1)  # at rest there is none: how it came there, or left
+    late = START_NOISE * speed_noise(b.roles, b.noise, w.period) / np.maximum(stops, 1e-300)
+    share = np.minimum(late / w.period, 1.0)  # of a sample
+    if turning:
+        turns |= np.roll(turns, -1) | np.roll(turns, 1)
+        share = np.full(w.n, TURNING)
+    process = np.where(turns, np.hypot(process, share * 2.0 * float(p.F_s or p.F_d) / J), process)
     excursion = (
         0.1 * float(np.ptp(w.position)) + 20.0 * position_noise(b, w),
         0.1 * float(np.ptp(w.speed)) + 20.0 * speed_noise(b.roles, b.noise, w.period),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ema.core.records import Array, Record
-from ema.discrepancy.plant import Block, Candidate, Errors, Free, Point
+from ema.discrepancy.plant import Block, Candidate, Errors, Fitted, Free, Point
 from ema.models import axis
 from ema.models.axis_config import INSTANCE, LINES, Axis
 from ema.models.axis_layout import row
@@ -117,17 +117,19 @@ class AxisPlant:
         """Terms that the torque residual along the measured motion suggests."""
         return structure.search(self, point, blocks)
 
-    def errors(self, point: Point, blocks: Sequence[int]) -> Errors:
+    def errors(self, point: Point, blocks: Sequence[int], fitted: Fitted | None = None) -> Errors:
         """Free-run error of the main output over its rms about the window's mean, pooled over records.
 
         The start state of each window is fitted to its first part: what is measured there is noisy, and no fault of the
-        simulation.
+        simulation. Nor is what noise made of parameters that were `fitted` to other windows, to first order.
         """
         squares: dict[str, list[tuple[float, float, float, int]]] = {}
-        for j, r in zip(blocks, self.free_run(point, blocks), strict=True):
+        drifts = self._drifts(point, blocks, fitted)
+        for j, r, drift in zip(blocks, self.free_run(point, blocks), drifts, strict=True):
             main = self.main_row(j)
             y = self.windows[j].outputs[main]
             r, floor = without_start(self.plant, self._bench_of[j], self.windows[j], r)
+            floor = floor + drift
             is_position = not self.windows[j].static and self._bench_of[j].roles.speed is None
             power = float(np.var(y)) if is_position else float(np.mean(y**2))
             squares.setdefault(self.windows[j].group, []).append(
@@ -140,6 +142,24 @@ class AxisPlant:
             weight += float(power @ n)
         error, noise = np.sqrt(np.mean(shares, axis=0))
         return Errors(float(error), float(noise), weight)
+
+    def _drifts(self, point: Point, blocks: Sequence[int], fitted: Fitted | None) -> list[Array]:
+        """Variance that the fitted parameters' own makes of free runs, (n_channels, n_times) by block: diag J Σ Jᵀ"""
+        if fitted is None or not fitted.free:
+            return [np.zeros((1, 1))] * len(blocks)
+        steps = [f.difference if f.high - point[f.name] >= f.difference else -f.difference for f in fitted.free]
+        pairs = zip(fitted.free, steps, strict=True)
+        points = [point, *({**point, f.name: point[f.name] + step} for f, step in pairs)]
+        here, *moved = self._map(lambda p: self._less_start(p, blocks), points)
+        found = []
+        for k, own in enumerate(here):
+            J = np.stack([(own - there[k]) / step for there, step in zip(moved, steps, strict=True)])
+            found.append(np.einsum("icn,ij,jcn->cn", J, fitted.covariance, J))
+        return found
+
+    def _less_start(self, point: Point, blocks: Sequence[int]) -> list[Array]:
+        pairs = zip(blocks, self.free_run(point, blocks), strict=True)
+        return [without_start(self.plant, self._bench_of[j], self.windows[j], r)[0] for j, r in pairs]
 
     def describe(
         self, found: Sequence[Candidate], point: Point, draw: Callable[[int], Sequence[Point]]
