@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-
-from ema.core.records import Array
 
 from .along import LINES
 from .found import Balance, Term
 from .law import BY_RECORD, BY_RECORD_NAME, Law
 from .links import LINKS
-from .needed import Asked, families_held, is_needed
+from .needed import ALARM, Asked, chance, families_held, is_needed
 from .regression import Corrected, Plain, Regression, fitted
 from .rows import Rows
 
-MOST_LAWS = 8
+MOST_LAWS = 8  # a series of lines is one
+MOST_LINES = 16  # of one series: each takes a tenth at least of what those before it left
 SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
 N_DRAWS = 400  # of blocks, to see how often a law wins
 
@@ -29,8 +28,8 @@ def chosen(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence[Law]
     asked = Asked.of(drive * n, every)
     base = fitted(found, plain, given)
     model, declared = base, {law.key for law in given}
-    while len(model.laws) < MOST_LAWS:
-        trials = _trials(found, plain, model, every)
+    while _n_laws(model) < MOST_LAWS:
+        trials = _trials(found, plain, model, [law for law in every if not _is_full(model, law)])
         best = _simplest(trials, asked)
         if best is None or not is_needed(best, model, asked):
             break
@@ -44,6 +43,16 @@ def chosen(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence[Law]
         base.loss / n, model.loss / n, float(np.mean(found.sigma[found.whole] ** 2)),
         given=tuple(given),
     )  # fmt: skip
+
+
+def _n_laws(model: Regression) -> int:
+    """Laws of a model, a series of lines as one."""
+    return len({law.family if law.family in LINES else law.key for law in model.laws})
+
+
+def _is_full(model: Regression, law: Law) -> bool:
+    """Whether the series that a line belongs to has all the lines it may have."""
+    return law.family in LINES and sum(own.family == law.family for own in model.laws) >= MOST_LINES
 
 
 def _simplest(trials: Sequence[Regression], asked: Asked) -> Regression | None:
@@ -127,18 +136,43 @@ def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequenc
         if other.family == law.family and other.name != law.name:
             siblings.setdefault(other.name, []).append(other)
     same = [fitted(found, plain, _with(without, _best(found, without, own))) for own in siblings.values()]
-    rivals: dict[str, Array] = {}
+    rivals: dict[str, Regression] = {}
     for r in [*others, *same]:
         own = r.laws[-1].name.removesuffix(BY_RECORD_NAME)
         if law.family in families_held(r.laws[-1].family) and not is_needed(r, model, replace(asked, whole=0.0)):
             continue  # it can do what this law does and more, and need not
-        if own != law.name.removesuffix(BY_RECORD_NAME) and (own not in rivals or r.loss < float(rivals[own].sum())):
-            rivals[own] = r.losses
-    names, losses = [law.name, *rivals], np.stack([model.losses, *rivals.values()])
+        if own != law.name.removesuffix(BY_RECORD_NAME) and (own not in rivals or r.loss < rivals[own].loss):
+            rivals[own] = r
+    share = _wins(law.name, model, rivals)
+    seen: set[str] = set()
+    while doubtful := [name for name in rivals if share[name] > SELDOM and name not in seen]:
+        seen |= {*doubtful}
+        for name in doubtful:
+            if _is_ruled_out(found, plain, model, law, rivals[name]):
+                del rivals[name]
+        share = _wins(law.name, model, rivals)
+    alike = {name: wins for name, wins in share.items() if name != law.name and wins > SELDOM}
+    common = float(np.mean([model.shared(law, r) for r in others])) if others else 0.0
+    return Term(law, (without.loss - model.loss) / max(int(found.whole.sum()), 1), share[law.name], alike, common)
+
+
+def _wins(name: str, model: Regression, rivals: Mapping[str, Regression]) -> dict[str, float]:
+    """How often each leaves least, over draws of blocks; `name` is the model itself."""
+    losses = np.stack([model.losses, *(r.losses for r in rivals.values())])
     rng = np.random.default_rng(0)
     drawn = rng.multinomial(losses.shape[1], np.full(losses.shape[1], 1.0 / losses.shape[1]), N_DRAWS)
     winners = np.argmin(losses @ drawn.T, axis=0)
-    share = {name: float(np.mean(winners == k)) for k, name in enumerate(names)}
-    alike = {name: share[name] for name in rivals if share[name] > SELDOM}
-    common = float(np.mean([model.shared(law, r) for r in others])) if others else 0.0
-    return Term(law, (without.loss - model.loss) / max(int(found.whole.sum()), 1), share[law.name], alike, common)
+    return {own: float(np.mean(winners == k)) for k, own in enumerate([name, *rivals])}
+
+
+def _is_ruled_out(found: Rows, plain: Plain, model: Regression, law: Law, rival: Regression) -> bool:
+    """Whether beside the rival this law is needed, and beside this law the rival is not.
+
+    Draws of blocks compare what each leaves; of few blocks that says little, where a fit of both says which one is idle
+    (Davidson and MacKinnon, "Several tests for model specification in the presence of alternative hypotheses",
+    Econometrica 49, 1981).
+    """
+    other = rival.laws[-1]
+    both = fitted(found, plain, [*model.laws, other])
+    beside = fitted(found, plain, [*rival.laws, law])
+    return chance(beside, rival, [law]) < ALARM <= chance(both, model, [other])

@@ -28,7 +28,7 @@ from .links import LINKS
 from .regression import LEAST as ON_ONE_BLOCK
 from .regression import Regression
 
-ALARM = 0.01  # probability that chance alone makes any of the laws that are asked for
+ALARM = 0.01  # probability that chance alone answers a question: whether any law acts, or one beside a certain other
 CLEAR = 3.0  # deviations over blocks by which one of two rivals must foretell held-out blocks better
 MATTERS = 0.1  # share of what is left that a law must take
 LEAST = 3e-4  # share of the drive's torque in power that a law must take, where more is left than it takes
