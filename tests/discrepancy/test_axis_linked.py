@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from ema.discrepancy.axis.balance.telling import told
 from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.ruling import ruling
 from ema.models.axis_config import RotaryAxis
 
 WIDE = 1.5  # half intervals of 95 %: nine numbers are asked for
@@ -17,13 +20,13 @@ def arm(support):
 
     def of(seed=1, **hidden):
         build = pendulum.Arm(**hidden)
-        out = {}
+        out, plants = {}, {}
         for name, side, record in zip(
             ("shoulder", "elbow"), ("outer", "inner"), pendulum.records(build, seed), strict=True
         ):
             plant = AxisPlant(RotaryAxis.model_validate(pendulum.plant(side)), [record])
-            out[name] = told(plant.balance, linear=False)
-        return out, pendulum.truth(build)
+            out[name], plants[name] = told(plant.balance, linear=False), plant
+        return out, pendulum.truth(build), plants
 
     return of
 
@@ -34,7 +37,7 @@ def off(q, truth):
 
 
 def test_rigid_body_terms_of_both_joints_are_those_of_the_arm(arm):
-    found, truth = arm()
+    found, truth, plants = arm()
     for name in ("shoulder", "elbow"):
         (links,) = found[name]["given"]
         asked = {k: q for k, q in links["parameters"].items() if not k.startswith("phase")}
@@ -45,10 +48,15 @@ def test_rigid_body_terms_of_both_joints_are_those_of_the_arm(arm):
         assert base["dry_friction"]["value"] == pytest.approx({"shoulder": 0.1, "elbow": 0.08}[name], rel=0.25)
         assert found[name]["terms"] == []
         assert found[name]["explained"]["fitted"] > 0.97
+        said = ruling(plants[name], SimpleNamespace(verdict="unexplained"))  # of free runs, which know no neighbour
+        assert [e.name for e in said.effects] == ["linked_axis"]
+        assert said.effects[0].confidence > 0.9
+        assert not said.effects[0].in_every_record  # the axis model has no neighbour
+        assert "neighbouring axis" in said.note
 
 
 def test_friction_on_the_sum_of_both_speeds_is_named(arm):
-    found, _ = arm(on_sum=0.3)
+    found, _, _ = arm(on_sum=0.3)
     term = {t["name"]: t for t in found["elbow"]["terms"]}["coupled_friction"]
     assert "sum" in term["sentence"]
     assert term["confidence"] > 0.9

@@ -46,21 +46,26 @@ def together(
             if out[k].indistinguishable_from:
                 continue
             out[k] = replace(out[k], confidence=max(out[k].confidence, round(b.confidence(term), 4)))
-    if b is None or verdict in ("adequate", "explained") or not _missing(b, out):
+    if b is None or verdict in ("adequate", "explained") or not missing(b, out):
         return out, None
     if found:
         b = balance_beside(plant, point)
-    added = _missing(b, out) if b is not None else []
+    added = missing(b, out) if b is not None else []
     if b is None or not added:
         return out, None
-    return [*out, *(_effect(plant, b, term, _named(b, term)) for term in added)], b
+    return [*out, *of_balance(plant, b, added)], b
 
 
-def _missing(b: Balance, found: Sequence[shared.FoundEffect]) -> list[Term]:
+def missing(b: Balance, found: Sequence[shared.FoundEffect]) -> list[Term]:
     """Likely laws that the library has as effects, and that nothing found stands for."""
     told = {name for e in found for name in (e.name, *e.indistinguishable_from)}
     new = [term for term in b.terms if (name := _named(b, term)) and not {name, *term.law.also} & told]
     return [term for term in new if b.of_set(term) >= LIKELY]
+
+
+def of_balance(plant: AxisPlant, b: Balance, terms: Sequence[Term]) -> list[shared.FoundEffect]:
+    """Laws of the balance as effects that were found."""
+    return [_effect(plant, b, term, _named(b, term)) for term in terms]
 
 
 def _named(b: Balance, term: Term) -> str:

@@ -30,11 +30,9 @@ from .next_records import next_records
 from .plant import AxisPlant
 from .plausible import implausible
 from .plausible import told as electrical
+from .ruling import gain as of_balance
+from .ruling import ruling
 
-ALONE = (
-    "free runs know nothing of the neighbouring axis: their verdict and fitted values are of this axis alone; the "
-    "balance knows both"
-)
 MOVED = 0.02  # of the plant file's friction: less is not worth a word
 
 
@@ -77,12 +75,17 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     if outcome.verdict != "adequate":
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
     said = _balance(plant, outcome)
-    found, by_balance = together(plant, [_effect(e) for e in outcome.effects], outcome.verdict, outcome.point)
+    rules = ruling(plant, outcome)
+    if rules is not None and plant.balance is not None:
+        found, verdict = rules.effects, graded(rules.left, named=bool(rules.effects))
+        by_balance: Balance | None = plant.balance
+        gain = shared.Gain(**of_balance(plant.balance, rules.left, outcome, isinstance(plant.plant, LinearAxis)))
+        notes, structure = [rules.note], {}
+    else:
+        found, by_balance = together(plant, [_effect(e) for e in outcome.effects], outcome.verdict, outcome.point)
+        verdict = graded(outcome.left, named=True) if by_balance is not None and outcome.left else outcome.verdict
     found = with_external(plant, found)
-    verdict = graded(outcome.left, named=True) if by_balance is not None and outcome.left else outcome.verdict
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
-    if plant.plant.neighbour is not None:
-        notes.append(ALONE)
     notes += [f"implausible: {text}" for text in implausible(plant, outcome)]
     notes += _moved(plant, outcome) + _kinds(plant) + list(ripple.said(plant)) + _zeros(plant, outcome)
     return shared.Findings(

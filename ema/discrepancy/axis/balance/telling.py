@@ -44,7 +44,7 @@ def told(b: Balance, *, linear: bool) -> dict[str, Any]:
         "rows": len(b.model.rows.y),
         "test_function": _short(2.0 * b.model.rows.half),
         "base": {name: _base(b, k, name, samples, linear) for k, name in enumerate(b.model.base)},
-        **({"given": [_law(b, law, samples) for law in b.given]} if b.given else {}),
+        **({"given": [of_law(b, law, samples) for law in b.given]} if b.given else {}),
         "terms": [_term(b, term, samples) for term in b.terms],
         **({"by_record": by_record(b.agreements, b.model.rows.motion.records, linear=linear)} if b.agreements else {}),
     }
@@ -77,7 +77,7 @@ def _base(b: Balance, k: int, name: str, samples: Array, linear: bool) -> dict[s
     return out
 
 
-def _law(b: Balance, law: Law, samples: Array) -> dict[str, Any]:
+def of_law(b: Balance, law: Law, samples: Array) -> dict[str, Any]:
     """A law with its parameters."""
     part = b.model.part(law)
     values = law.values(b.corrected.coefficients[part])
@@ -95,7 +95,7 @@ def _law(b: Balance, law: Law, samples: Array) -> dict[str, Any]:
 def _term(b: Balance, term: Term, samples: Array) -> dict[str, Any]:
     values = term.law.values(b.corrected.coefficients[b.model.part(term.law)])
     out = {
-        **_law(b, term.law, samples),
+        **of_law(b, term.law, samples),
         "confidence": round(b.confidence(term), 4),
         "indistinguishable_from": sorted({*term.alike, *term.law.also}),
         "separated_by": term.law.separated_by,

@@ -1,0 +1,135 @@
+"""The verdict by the balance of torque, where free runs cannot say.
+
+They know no neighbouring axis. And where noise alone makes more of a free run than there is motion in the record, or
+they are as good with a law as without it, they are no witness against what the balance sees: the verdict is then its
+own, of held-out blocks of torque, and says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ema.core.records import Array
+from ema.discrepancy import findings as shared
+from ema.discrepancy.folds import Folds
+from ema.discrepancy.grade import UPPER, Left
+from ema.discrepancy.outcome import Outcome
+from ema.models.axis_config import LinearAxis
+
+from .agreeing import missing, of_balance
+from .balance.as_effects import effects, point
+from .balance.found import Balance
+from .balance.needed import ALARM, chance
+from .balance.regression import fitted
+from .balance.telling import drawn, of_law
+
+if TYPE_CHECKING:
+    from .plant import AxisPlant
+
+WORSE = 0.1  # of the mean square of the free runs' residual, that a law may add to it and not be refuted by them
+NEIGHBOUR = "they know nothing of the neighbouring axis"
+BLIND = "they are no worse with what the balance names than without, so they cannot say"
+
+
+@dataclass(frozen=True)
+class Ruling:
+    """What the balance says in place of free runs, and why it does."""
+
+    effects: list[shared.FoundEffect]
+    left: Left
+    why: str
+
+    @property
+    def note(self) -> str:
+        """For the reader of the verdict."""
+        return f"the verdict and the gain are of the balance of torque, not of free runs: {self.why}"
+
+
+def ruling(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
+    """The balance's own verdict; None where free runs can say, or where there is no balance."""
+    b = plant.balance
+    if b is None:
+        return None
+    if b.given:
+        own = [_neighbour(b)] if _is_seen(b) else []
+        return Ruling([*own, *of_balance(plant, b, missing(b, []))], _left(plant, b), NEIGHBOUR)
+    named = missing(b, []) if outcome.verdict == "adequate" else []
+    if named and not _is_refuted(plant, outcome, b):
+        return Ruling(of_balance(plant, b, named), _left(plant, b), BLIND)
+    return None
+
+
+def gain(b: Balance, left: Left, outcome: Outcome, linear: bool) -> dict[str, Any]:
+    """Fields of `findings.Gain` as the balance has them."""
+    folds, numbers = left.error, point(b, linear=linear)
+    return {
+        "train_before": folds.err_before,
+        "train_after": float(np.sqrt(np.mean(b.model.left**2) / b.drive)),
+        "heldout_before": folds.err_before,
+        "heldout_after": folds.err_after,
+        "noise_floor": folds.noise_floor,
+        "k_before": tuple(outcome.k_before),
+        "k_after": tuple(numbers.get(name, k) for name, k in zip(outcome.base, outcome.k_after, strict=True)),
+        "k_names": tuple(outcome.base),
+        "what": f"held-out error of the balance over the drive's {'force' if linear else 'torque'}",
+        "scale": 100.0,
+        "unit": "%",
+        "folds": folds,
+        "residual": folds,
+    }
+
+
+def _left(plant: AxisPlant, b: Balance) -> Left:
+    """What the balance leaves of held-out blocks, over the drive's torque."""
+    rows = b.model.rows
+    before = (rows.y - b.plain.inertia * rows.alpha) ** 2
+    parts = [own for k in range(rows.n_blocks) if (own := np.flatnonzero(rows.whole & (rows.block == k))).size]
+
+    def of(squares: Array) -> tuple[float, ...]:
+        return tuple(float(np.mean(squares[own]) / b.drive) for own in parts)
+
+    names, weight = tuple(f"block {k + 1}" for k in range(len(parts))), tuple(float(own.size) for own in parts)
+    folds = Folds(names, of(before), of(b.model.held_out**2), of(rows.sigma**2), weight)
+    unsure = max(folds.rest_error if np.isfinite(folds.rest_error) else 0.0, plant.noise_uncertainty)
+    return Left(folds.rest <= 1.0 + UPPER * unsure, folds, folds, noise_uncertainty=plant.noise_uncertainty)
+
+
+def _is_seen(b: Balance) -> bool:
+    """Whether the declared neighbour does anything."""
+    without = fitted(b.model.rows, b.plain, [law for law in b.model.laws if law not in b.given])
+    return chance(b.model, without, b.given) < ALARM
+
+
+def _neighbour(b: Balance) -> shared.FoundEffect:
+    """The declared neighbour as a cause: its mark over that and the rest is how sure it is."""
+    (law,) = b.given
+    told = of_law(b, law, drawn(b))
+    without = fitted(b.model.rows, b.plain, [own for own in b.model.laws if own is not law])
+    mark = (without.loss - b.model.loss) / max(int(b.model.rows.whole.sum()), 1)
+    sure = max(mark, 0.0) / max(mark + b.left - b.noise, 1e-300)
+    parameters = {name: shared.Quantity(**q) for name, q in told["parameters"].items()}
+    return shared.FoundEffect(
+        told["name"],
+        round(min(sure, 1.0), 4),
+        (),
+        parameters,
+        told["sentence"],
+        law.separated_by,
+        in_every_record=False,
+    )
+
+
+def _is_refuted(plant: AxisPlant, outcome: Outcome, b: Balance) -> bool:
+    """Whether free runs with the balance's laws and numbers leave more than without."""
+    if not all(effects(b, term) for term in b.terms):
+        return True
+    blocks = range(len(plant.blocks))
+    numbers = {**outcome.point, **point(b, linear=isinstance(plant.plant, LinearAxis))}
+    here, there = (
+        float(np.mean(np.concatenate([np.clip(r, -20.0, 20.0).ravel() ** 2 for r in plant.residuals([p], blocks)[0]])))
+        for p in (outcome.point, numbers)
+    )
+    return there > here * (1.0 + WORSE)

@@ -1,0 +1,51 @@
+"""The balance gives the verdict where free runs cannot say, and only there."""
+
+from __future__ import annotations
+
+from types import ModuleType, SimpleNamespace
+
+import pytest
+
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.ruling import ruling
+from ema.discrepancy.grade import graded
+from ema.models.axis_config import RotaryAxis
+
+QUIET = {"noise": 0.01, "spikes": 0.0, "speed_noise": 0.01}
+
+
+@pytest.fixture(scope="module")
+def short_pendulum(support) -> ModuleType:
+    return support("short_pendulum")
+
+
+def plant_of(module, **hidden):
+    build = module.Pendulum(**hidden)
+    return AxisPlant(RotaryAxis.model_validate(module.plant(build)), [module.record(build, 2)])
+
+
+FITTED = {"J": 0.14, "F_d": 0.25, "C": 0.02}  # as free runs would
+
+
+def as_free_runs_had(verdict):
+    return SimpleNamespace(verdict=verdict, point=FITTED)
+
+
+def test_a_law_that_free_runs_are_blind_to_is_named_by_the_balance_which_says_so(short_pendulum):
+    plant = plant_of(short_pendulum)
+    said = ruling(plant, as_free_runs_had("adequate"))
+    assert [e.name for e in said.effects] == ["pendulum"]
+    assert "not of free runs" in said.note
+    assert graded(said.left, named=True) in ("explained", "partly explained")
+
+
+def test_where_the_balance_needs_no_law_free_runs_keep_their_verdict(short_pendulum):
+    plant = plant_of(short_pendulum, G=0.0)
+    assert ruling(plant, as_free_runs_had("adequate")) is None
+
+
+def test_free_runs_that_are_worse_with_a_law_refute_it(short_pendulum):
+    plant, other = plant_of(short_pendulum, G=0.0, **QUIET), plant_of(short_pendulum, **QUIET)
+    assert [t.law.name for t in other.balance.terms] == ["pendulum"]
+    plant._balances[plant.between] = other.balance  # of another axis
+    assert ruling(plant, as_free_runs_had("adequate")) is None
