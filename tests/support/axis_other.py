@@ -54,7 +54,7 @@ class Setup:
     channels: tuple[str, ...] = ()  # optional ones to keep; all if empty
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _bristle(z, v, h, p, hid):
     """Deflection after a time h at speed v, exactly."""
     side = 1.0 + hid[5] * (1.0 if v > 0.0 else -1.0)
@@ -69,7 +69,7 @@ def _bristle(z, v, h, p, hid):
 VISCOUS, CONSTANT, COGGING, ORDER, SPRING, ASYMMETRY, QUADRATIC, EVEN = range(8)
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _rates(x, v, z, i, u, mode, p, hid, out):
     inertia, F_d, F_s, C, k_t, k_e, R, L, w_s, bristle = p
     force = k_t * i if mode != 2 else u
@@ -88,7 +88,7 @@ def _rates(x, v, z, i, u, mode, p, hid, out):
     out[3] = (u - R * i - k_e * v) / L if mode == 1 else 0.0
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _run(n, ratio, h, mode, p, hid, amplitude, frequency, constant, phase, K, limit, held, x0, out):
     s = np.array([x0, 0.0, 0.0, 0.0])
     k1, k2, k3, k4 = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4)

@@ -29,7 +29,7 @@ class Arm:
     on_sum: float = 0.0  # [N m] dry friction at both joints on the sum of their speeds
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _mass(q, p):
     m1, m2, l1, r1, r2, I1, I2, rotor, gear = p
     M = np.zeros((2, 2))
@@ -44,13 +44,13 @@ def _mass(q, p):
     return M
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _height(q, p):
     m1, m2, l1, r1, r2 = p[:5]
     return -9.81 * (m1 * r1 * np.cos(q[0]) + m2 * (l1 * np.cos(q[0]) + r2 * np.cos(q[0] + q[1])))
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _run(reference, fine, dt, p, dry, viscous, on_sum, noise, out):
     q, v, e = reference[0].copy(), np.zeros(2), 1e-5
     slope = np.zeros((2, 2, 2))

@@ -46,7 +46,7 @@ class Axis:
     noise: tuple[float, float, float] = (2e-4, 0.05, 4e-3)  # position, speed, current
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _run(reference, hz, p, of_load, along, warm, lines, loop, out):
     J, F, C, k_t, bristle, dry_k, activation, dry_rate, viscous_rate, by_square, flux, unequal, saturation = p
     gravity, by_load, by_load_square = of_load

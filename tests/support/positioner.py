@@ -32,7 +32,7 @@ class Table:
     hz: int = 1000
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _table(reference, hz, M, F_d, Cp, Cn, constant, quadratic, spring, stribeck, counts, noise, out):
     q, v, fine = 0.0, 0.0, 40
     dt = 1.0 / (hz * fine)
@@ -106,7 +106,7 @@ class Servo:
     count: float = 2 * np.pi / 4096
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _servo(reference, on, hz, J, gravity, F_d, C, by_load, constant, k_t, k_e, R, supply, count, kp, out):
     theta, w, fine = 0.0, 0.0, 100
     dt = 1.0 / (hz * fine)

@@ -17,7 +17,7 @@ SPEED_LOOP = {**PLANT, "drive": "speed-loop", "loop": {"K_w": 0.4}}
 CURRENT = {**PLANT, "drive": "current"}
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _run(command, is_position, samples, J, F, C, i_sat, out):
     theta, w, i, dt = 0.0, 0.0, 0.0, 1.0 / (RATE * FINE)
     for k in range(len(command)):

@@ -37,12 +37,12 @@ def plant(build: Pendulum) -> dict[str, object]:
     return {"kind": "axis", "drive": "torque", "J": 0.5 * build.J, "F_d": build.F, "C": 0.0, "fitted": ["J", "C"]}
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _acceleration(theta, w, torque, J, G, C, F):
     return (torque - G * np.sin(theta) - C * w - F * np.tanh(w / 0.02)) / J
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _swung(dt, wanted, ahead, noise, J, G, C, F, out):
     theta, w, h = 0.0, 0.0, dt / FINE
     for k in range(len(wanted)):

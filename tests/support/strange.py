@@ -53,7 +53,7 @@ def sizes(kind: int, axis: Axis, rng: np.random.Generator) -> tuple[float, float
     }[kind]
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _run(reference, kind, axis, q, gusts, loop, out):
     J, F, C, k_t = axis
     a, b, c = q
