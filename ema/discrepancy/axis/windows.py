@@ -90,7 +90,7 @@ def bench(plant: Axis, record: Record, name: str, length: float) -> Bench:
         record = replace(record, cycles=numbered)
     if not static and who.position and who.speed and all(is_derived(c, who.position, who.speed) for c in record):
         who = replace(who, speed=None, outputs=tuple(c for c in who.outputs if c != who.speed), derived=who.speed)
-    noise = {c: _noise(plant, record, c) for c in ({who.drive} if static else {who.drive, *who.outputs})}
+    noise = {c: _noise(plant, record, c) for c in dict.fromkeys([who.drive] if static else [who.drive, *who.outputs])}
     if static and plant.drive != "current" and not plant.is_force:
         raise RecordError(
             f"{record.name}: a record at standstill needs drive: current with i_q [A], or a measured torque or force"

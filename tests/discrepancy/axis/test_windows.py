@@ -1,0 +1,61 @@
+"""Records cut into windows, with what each channel's noise is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema.core.errors import RecordError
+from ema.core.records import Cycle, Record
+from ema.discrepancy.axis.noise import estimate, quantum
+from ema.discrepancy.axis.windows import bench
+from ema.models.axis_config import RotaryAxis
+
+PLANT = RotaryAxis(J=1e-4, F_d=0.01, k_t=0.05)
+T = np.arange(0.0, 1.0, 1e-3)
+RNG = np.random.default_rng(5)
+
+
+def record(**noise: float) -> Record:
+    """Of a motor that swings, with white noise of the given rms on its channels."""
+    true = {"i_q": np.cos(9.0 * T), "theta_m": 0.5 * np.sin(9.0 * T), "w_m": 4.5 * np.cos(9.0 * T)}
+    noisy = {name: x + noise.get(name, 0.0) * RNG.standard_normal(len(T)) for name, x in true.items()}
+    return Record((Cycle(0, {"t": T, **noisy}),))
+
+
+def test_channels_stand_in_one_order_whatever_their_names_hash_to():
+    """What is told of their noise had come in another order in every other process."""
+    found = bench(PLANT, record(i_q=0.01, theta_m=1e-3, w_m=0.02), "one", 0.1)
+    assert list(found.noise) == [found.roles.drive, *found.roles.outputs]
+
+
+def test_noise_is_estimated_or_as_declared():
+    made = record(i_q=0.01, theta_m=1e-3, w_m=0.02)
+    found = bench(PLANT, made, "one", 0.1).noise
+    assert found["w_m"].sigma == pytest.approx(0.02, rel=0.15)
+    assert found["theta_m"].sigma == pytest.approx(1e-3, rel=0.15)
+    declared = bench(PLANT.model_copy(update={"noise": {"w_m": 0.5}}), made, "one", 0.1).noise
+    assert (declared["w_m"].sigma, declared["w_m"].declared) == (0.5, True)
+
+
+def test_windows_are_about_as_long_as_asked_and_cover_no_sample_twice():
+    found = bench(PLANT, record(theta_m=1e-3, w_m=0.02), "one", 0.1)
+    assert not found.static
+    times = np.concatenate([w.t for w in found.windows])
+    assert np.all(np.diff(times) > 0.0)
+    assert np.median([w.t[-1] - w.t[0] for w in found.windows]) == pytest.approx(0.1, rel=0.3)
+
+
+def test_a_record_without_enough_samples_is_refused():
+    short = Record((record().cycles[0].rows(0, 5),))
+    with pytest.raises(RecordError, match="too short"):
+        bench(PLANT, short, "one", 0.1)
+
+
+def test_steps_of_a_counter_are_its_noise():
+    step = 2.0 * np.pi / 4096
+    counted = step * np.round(np.sin(9.0 * T) / step)
+    assert quantum(counted) == pytest.approx(step)
+    assert quantum(np.sin(9.0 * T)) == 0.0
+    least = estimate((Cycle(0, {"t": T, "theta_m": counted}),), "theta_m", None).sigma
+    assert least >= (1.0 - 1e-9) * step / np.sqrt(12.0)
