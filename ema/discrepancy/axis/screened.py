@@ -21,7 +21,7 @@ SCREENED = (
     *("friction_drift", "viscous_drift", "friction_by_temperature", "viscous_by_temperature"),
 )
 ROOM = 10.0  # times the size that the regression found, to which a fit may go
-FIXED = ("centre", "since", "coefficient", "damping")  # parameters that the records of one bench hardly show
+FIXED = ("turns", "centre", "since", "coefficient", "damping")  # parameters that the records of one bench hardly show
 
 
 def screened(balance: Balance | None, plant: Axis, point: Point) -> list[Candidate]:

@@ -29,8 +29,9 @@ def by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[L
     span = float(np.ptp(m.theta))
     centre = 0.5 * float(m.theta.max() + m.theta.min())
     yield _spring(centre, u)
+    if not linear:
+        yield from (_pendulum(u, turns) for turns in dict.fromkeys((1.0, m.turns)) if turns * span > LEAST_TURN)
     if not linear and span > LEAST_TURN:
-        yield _pendulum(u)
         yield Law(
             "friction once per turn",
             "friction once per turn",
@@ -121,15 +122,17 @@ def _of_line(order: float) -> Values:
     return values
 
 
-def _pendulum(u: Units) -> Law:
+def _pendulum(u: Units, turns: float) -> Law:
+    """On the axis itself, or behind a gear."""
+    behind = "" if turns == 1.0 else f" of the load, {1.0 / turns:.4g} of this side"
     return Law(
         "pendulum",
+        "pendulum" if turns == 1.0 else f"pendulum {turns:.6g}",
         "pendulum",
-        "pendulum",
-        _line(1.0),
-        {"amplitude": u.torque, "phase": "rad"},
-        lambda c: {name: x for name, x in _of_line(1.0)(c).items() if name != "order"},
-        f"gravity on a pendulum or an unbalanced load, {{amplitude:.3g}} {u.torque} once per turn",
+        _line(turns),
+        {"amplitude": u.torque, "phase": "rad", "turns": "1"},
+        lambda c: {**_of_line(0.0)(c), "turns": turns},
+        f"gravity on a pendulum or an unbalanced load, {{amplitude:.3g}} {u.torque} once per turn{behind}",
         "the same motion with the shaft upright",
         n_columns=2,
     )

@@ -124,7 +124,7 @@ _RELATIVE: tuple[_Maker, ...] = (
 )
 _MAKERS: Mapping[str, _Maker] = {
     "viscous_by_direction": _as_it_is("viscous_by_direction", "difference"),
-    "pendulum": _as_it_is("pendulum", "amplitude", "phase"),
+    "pendulum": _as_it_is("pendulum", "amplitude", "phase", "turns"),
     "output_load_friction": _as_it_is("output_load_friction", "share"),
     "quadratic_output_load_friction": _as_it_is("quadratic_output_load_friction", "per_torque"),
     "quadratic_load_friction": _quadratic_load_friction,

@@ -17,6 +17,7 @@ class Motion:
     `drive` is the drive's torque; `known` what is left of it to accelerate the axis, by the plant file.
     `direction` is ±1 or, where the axis may rest, 0. `has_position` is False where the position was integrated.
     `dT` is the winding's temperature less 20 °C [K]; `gear_orders` are those at which a gear may err, per turn.
+    `turns` is how often the load turns for one turn of the recorded side.
     `other` is angle, speed and acceleration of a neighbouring axis, which is the `neighbour` "inner" or "outer" one.
     `record` is which of `records` a sample is of.
     """
@@ -36,3 +37,4 @@ class Motion:
     records: tuple[str, ...] = ()
     dT: Array = field(default_factory=lambda: np.empty(0))
     gear_orders: tuple[float, ...] = ()
+    turns: float = 1.0

@@ -41,11 +41,15 @@ def moving(plant: Measured, model: axis.Model, c: Course, half: float) -> Motion
     known = axis.torque_along(model, theta, w, i, c.t, c.dT, force=is_force)
     still = np.zeros(len(w), bool)
     motion = Motion(c.t, theta, w, a, drive, known, direction, c.position is not None, still, dT=c.dT)
-    motion = replace(motion, gear_orders=tuple(plant.plant.gear_orders))
+    motion = replace(motion, gear_orders=tuple(plant.plant.gear_orders), turns=_turns(plant))
     if c.other is None or plant.plant.neighbour is None:
         return motion
     psi, v, accelerates = local_polynomial(c.t, c.other, n_half, 3)[:3]
     return replace(motion, other=(psi, v, accelerates), neighbour=plant.plant.neighbour)
+
+
+def _turns(plant: Measured) -> float:
+    return 1.0 / plant.plant.gear if plant.plant.measured_at == "motor" else 1.0
 
 
 def at_rest(plant: Measured, model: axis.Model, c: Course) -> Motion:
@@ -70,7 +74,7 @@ def joined(motions: Sequence[Motion]) -> Motion:
 
     columns = (of("t"), of("theta"), of("w"), of("a"), of("drive"), of("known"), of("direction"))
     motion = Motion(*columns, all(m.has_position for m in motions), of("static").astype(bool), dT=of("dT"))
-    motion = replace(motion, gear_orders=motions[0].gear_orders)
+    motion = replace(motion, gear_orders=motions[0].gear_orders, turns=motions[0].turns)
     if not all(m.neighbour for m in motions):
         return motion
     psi, v, a = (np.concatenate([m.other[k] for m in motions]) for k in range(3))
