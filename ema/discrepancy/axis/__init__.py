@@ -21,6 +21,9 @@
 `fading`        the search for the speed over which friction falls
 `linear`        metres and newtons in what is said
 `between`       what the drive does between samples
+`named_laws`    laws of the balance as effects of the library
+`agreeing`      free runs and the balance together: what both name
+`ruling`        the verdict by the balance, where free runs cannot say
 `structure`     terms suggested by the torque residual when no effect explains it
 `next_records`  what a balance could not tell, and the records that would
 `plausible`     nominal values that no machine has, and what would make them

@@ -19,12 +19,12 @@ from ema.discrepancy.grade import UPPER, Left
 from ema.discrepancy.outcome import Outcome
 from ema.models.axis_config import LinearAxis
 
-from .agreeing import missing, of_balance
 from .balance.as_effects import effects, point
 from .balance.found import Balance
 from .balance.needed import ALARM, chance
 from .balance.regression import fitted
 from .balance.telling import drawn, of_law
+from .named_laws import missing, of_balance
 
 if TYPE_CHECKING:
     from .plant import AxisPlant

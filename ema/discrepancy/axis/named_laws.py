@@ -1,0 +1,60 @@
+"""Laws of the balance as effects of the library: which are likely and told of nothing yet, with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ema.discrepancy import findings as shared
+from ema.effects import registry
+from ema.models.axis_config import LinearAxis
+
+from .balance.as_effects import effects
+from .balance.found import Balance, Term
+from .balance.telling import INTERVAL, drawn
+from .linear import in_metres
+
+if TYPE_CHECKING:
+    from .plant import AxisPlant
+
+LIKELY = 0.5  # confidence in a law, or those it is not told from, from which it is named where free runs have not
+ALONE = " (shown by the balance along the measured motion, not by free runs)"
+
+
+def missing(b: Balance, found: Sequence[shared.FoundEffect]) -> list[Term]:
+    """Likely laws that the library has as effects, and that nothing found stands for."""
+    told = {name for e in found for name in (e.name, *e.indistinguishable_from)}
+    new = [term for term in b.terms if (name := named(b, term)) and not {name, *term.law.also} & told]
+    return [term for term in new if b.of_set(term) >= LIKELY]
+
+
+def of_balance(plant: AxisPlant, b: Balance, terms: Sequence[Term]) -> list[shared.FoundEffect]:
+    """Laws of the balance as effects that were found."""
+    return [_effect(plant, b, term, named(b, term)) for term in terms]
+
+
+def named(b: Balance, term: Term) -> str:
+    """The effect that acts like a law; empty where the library has none."""
+    return next((name for name, values in effects(b, term).items() if values), "")
+
+
+def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.FoundEffect:
+    effect, linear = registry()[name], isinstance(plant.plant, LinearAxis)
+    said = in_metres if linear else str
+    values = effects(b, term)[name]
+    samples = [effects(b, term, c)[name] for c in drawn(b)]
+    units = {p.name: said(p.unit) for p in effect.parameters}
+    parameters = {}
+    for key, value in values.items():
+        spread = np.array([s[key] for s in samples])
+        if key == "phase":
+            spread = value + np.angle(np.exp(1j * (spread - value)))
+        low, high = np.percentile(spread, INTERVAL)
+        parameters[key] = shared.Quantity(value, float(low), float(high), units[key])
+    others = tuple(sorted({*term.alike, *term.law.also}))
+    confidence = round(b.of_set(term) / (1 + len(others)), 4)  # those in a set share what is sure of it
+    return shared.FoundEffect(
+        name, confidence, others, parameters, said(effect.said(values)) + ALONE, effect.separated_by
+    )  # fmt: skip
