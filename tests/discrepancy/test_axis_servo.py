@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.between import Rereading, examined
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.fitting import fit
 from ema.discrepancy.plant import Fitted
+from ema.discrepancy.progress import Progress
+from ema.discrepancy.selection import base_model, one_more
 from ema.models.axis_config import RotaryAxis
 
 ACTS_BETWEEN = "the speed loop acts between the samples of the record too"
@@ -63,15 +65,23 @@ def test_an_inertia_of_half_a_thousandth_is_no_cause(servo):
     assert outcome.verdict == "adequate"
 
 
-def test_a_drive_that_is_held_is_no_clock_of_its_own(support):
+def test_a_drive_that_is_held_is_taken_so_unless_an_effect_foretells_more(support):
     """Late by half a sample throughout, which a clock that is late by one at the end comes near to."""
     geared = support("geared")
-    axis = geared.Axis(J=1.24e-4, F=0.018, C=7.6e-4, warms=(20.0, 45.0, 3.0))
-    record = geared.record(axis, 42, seconds=7.0, temperature=True)
-    outcome = examined(AxisPlant(RotaryAxis.model_validate(geared.plant(axis)), [record]))
-    assert outcome.verdict == "adequate"
-    assert outcome.effects == []
-    assert any("each value is held until the next" in note for note in outcome.notes)
+    axis = geared.Axis(by_square=1.9)
+    plant = AxisPlant(RotaryAxis.model_validate(geared.plant(axis)), [geared.record(axis, 1, seconds=5.0)])
+    plain = base_model(plant)
+
+    def only(*names):
+        return lambda point, blocks: [c for c in plant.candidates(point, blocks) if c.key in names]
+
+    trials = one_more(plant, plain, only("saturation", "clock_skew of the drive"), str)
+    reread = Rereading(plant, Progress())
+    assert not reread(plain, trials["saturation"])
+    assert plant.between == "straight"
+    beside = one_more(plant, trials["saturation"], only("clock_skew of the drive"), str)
+    assert reread(trials["saturation"], beside["clock_skew of the drive"])
+    assert plant.between == "held"
 
 
 def test_what_noise_makes_of_parameters_is_no_error_of_the_simulation(servo):

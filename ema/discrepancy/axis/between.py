@@ -43,7 +43,7 @@ def examined(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
         return examine(plant, progress)
     progress("the drive between samples")
     plant.between = _of_plain(plant)
-    reread = _Reread(plant, progress)
+    reread = Rereading(plant, progress)
     outcome = examine(plant, progress, reread)
     here = plant.between
     there = _beside(plant, outcome)
@@ -71,7 +71,7 @@ def examined(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     return outcome
 
 
-class _Reread:
+class Rereading:
     """Takes the drive another way where this alone foretells more than the best further effect (`rounds.Reread`).
 
     What a drive does between samples has no parameter to fit: the one with the larger gain on held-out parts is it. A
@@ -82,6 +82,7 @@ class _Reread:
         self._plant, self._progress, self._turns = plant, progress, len(LATE)
 
     def __call__(self, model: Tried, further: Tried) -> bool:
+        """Whether the plant's records are taken another way from now on, for `model` and instead of `further`."""
         plant, here = self._plant, self._plant.between
         if plant.plant.drive == "speed-loop" or self._turns == 0:
             return False
