@@ -21,7 +21,7 @@ from .conditions import as_recorded
 from .cycles import measured
 from .entrants import weighed
 from .examination import Examination
-from .gear import swinging
+from .gear import resonance, swinging
 from .growing import beside, growing, said, widened
 from .measured import Measured
 from .next_recording import next_recording
@@ -73,8 +73,9 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
     plant, conditions = as_recorded(plant, data.signals)
     if left_out:
         conditions.append(left_out)
-    plant, data = as_held(plant, swinging(plant, data))
-    ema = EmaPlant(plant, data, n_threads)
+    gear = resonance(plant, data)
+    plant, data = as_held(plant, swinging(data, gear))
+    ema = EmaPlant(plant, data, n_threads, gear)
     say("switching noise")
     search = Search(ema, Noise(ema, {}), train, heldout, say)
     paths = faults_only(search, {})

@@ -5,19 +5,32 @@ Of those that promise most the best few are fitted, with what resembles them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ema.core.names import FAULTS
 
 from .comparators import PLAIN, take_step
 from .fit import fit
-from .model import CHANCE, FAR, Model
+from .model import CHANCE, FAR, Model, stripped
 from .noise import Noise, Verdict
 from .ridge import walked
 from .screening import AT_LEAST, Screened, looking_like, promising, simulated, start_with
 from .verdicts import NEARLY, as_on_the_bench, at_the_minimum, surely
-from .weighing import SAME, SLACK, WORTH_IT, does_it, is_alike, is_credible, is_enough, may_be_nothing
+from .weighing import (
+    SAME,
+    SLACK,
+    WORTH_IT,
+    does_it,
+    is_alike,
+    is_credible,
+    is_enough,
+    leaves_noise,
+    may_be_nothing,
+    within_reach,
+)
 
 if TYPE_CHECKING:
     from .search import Search
@@ -172,17 +185,18 @@ def extend(search: Search, model: Model, screened: Sequence[Screened], known: Se
     if known or model.excess > FAR:
         screened = simulated(search, model, screened)
     refined = _for_several_faults(search, model, screened)
-    refined |= _likeliest(search, model, screened, set(refined))
+    refined |= _likeliest(search, model, screened, refined)
     if not refined:
         return []
     best = min(refined.values(), key=lambda m: m.heldout)
-    for s in looking_like(search, model, best, screened, set(refined)):
-        m = _refined(search, model, s)
+    is_found = leaves_noise(search, best)
+    for s in looking_like(search, model, best, screened, set(refined), only_there=is_found):
+        m = _instead(search, best, s) if is_found else _refined(search, model, s, within_reach(best))
         effect = s.candidate.effect
         refined[effect] = min(m, refined.get(effect, m), key=lambda x: x.heldout)
-    # A rival is out only if it leaves more when fitted as well as the best.
+    # A rival is out only if it leaves more when fitted as well as the best, or promises to.
     for name, m in _close(refined, model):
-        again = search.model(m.effects, m.fit.free, m.fit.point, None, 4)
+        again = search.model(m.effects, m.fit.free, m.fit.point, None, 4, within_reach(best))
         refined[name] = min(m, again, key=lambda x: x.heldout)
     return sorted(refined.values(), key=lambda m: m.heldout)
 
@@ -190,29 +204,39 @@ def extend(search: Search, model: Model, screened: Sequence[Screened], known: Se
 def _for_several_faults(search: Search, model: Model, screened: Sequence[Screened]) -> dict[str, Model]:
     """One cause for several faults, tried whatever it promises, since the faults hide that.
 
-    Unless another one, simulated far from the data, takes nearly all by itself.
+    Unless another one, simulated far from the data, takes nearly all by itself. Once one leaves noise, the others are
+    asked from where that is, if they look like it.
     """
     if model.excess > FAR and screened[0].promised < NEARLY_ALL * _cost(model):
         return {}
     found: dict[str, Model] = {}
     for s in screened:
         if s.candidate.effect not in found and model.shows_faults_of(s.candidate):
-            found[s.candidate.effect] = _refined(search, model, s)
+            found[s.candidate.effect] = m = _refined(search, model, s)
+            if leaves_noise(search, m):
+                break
     return found
 
 
-def _likeliest(search: Search, model: Model, screened: Sequence[Screened], known: set[str]) -> dict[str, Model]:
-    """Those that promise most, one at least if none is known."""
+def _likeliest(
+    search: Search, model: Model, screened: Sequence[Screened], known: Mapping[str, Model]
+) -> dict[str, Model]:
+    """Those that promise most, one at least if none is known, until one leaves noise."""
     cost = _cost(model)
     worth = max(WORTH_A_FIT * (cost - cost / model.fit.misfit), AT_LEAST * cost)
     found: dict[str, Model] = {}
+    if any(leaves_noise(search, m) for m in known.values()):
+        return found
     for s in screened:
         if (known or found) and cost - s.promised < worth:
             break
         if len(found) >= N_REFINED or (found and _clear(search, found, s.promised)):
             break
         if s.candidate.effect not in {*known, *found}:
-            found[s.candidate.effect] = _refined(search, model, s)
+            best = min(found.values(), key=lambda m: m.heldout, default=None)
+            found[s.candidate.effect] = m = _refined(search, model, s, within_reach(best) if best else np.inf)
+            if leaves_noise(search, m):
+                break
     return found
 
 
@@ -220,7 +244,7 @@ def _cost(model: Model) -> float:
     return sum(float(r @ r) for r in model.fit.residuals.values())
 
 
-def _refined(search: Search, model: Model, s: Screened) -> Model:
+def _refined(search: Search, model: Model, s: Screened, to_beat: float = np.inf) -> Model:
     frees = (*model.fit.free, *s.candidate.frees)
     start, cost = search.better([s.start, start_with(search, model, s.candidate, dict.fromkeys(FAULTS, 0.0))], model)
     if model.shows_faults_of(s.candidate):
@@ -236,15 +260,23 @@ def _refined(search: Search, model: Model, s: Screened) -> Model:
         simpler, simpler_cost = search.better([alone.point], model)
         if simpler_cost < NO_WORSE * cost:
             start = simpler
-    made = search.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3)
+    made = search.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3, to_beat)
     return walked(search, model, made, s.candidate) if model.shows_faults_of(s.candidate) else made
+
+
+def _instead(search: Search, best: Model, s: Screened) -> Model:
+    """A rival in the place of the last effect of `best`, which leaves noise, begun from where that is."""
+    effects, frees, _ = stripped(best, best.effects[-1])
+    free = (*frees, *s.candidate.frees)
+    return search.model((*effects, s.candidate), free, s.start, best.fit.columns, 3, within_reach(best))
 
 
 def _close(refined: dict[str, Model], model: Model) -> list[tuple[str, Model]]:
     """The models near the best, by what there was to explain too; none if the best stands alone without a rest."""
     ranked = sorted(refined.items(), key=lambda item: item[1].heldout)
     best = ranked[0][1]
-    near = [(name, m) for name, m in ranked[:3] if m.excess < max(2.0 * best.excess + 0.2, NEARLY_ALL * model.excess)]
+    within = max(2.0 * best.excess + 0.2, NEARLY_ALL * model.excess)
+    near = [(name, m) for name, m in ranked[:3] if m.excess < within and not m.fit.given_up]
     return near if len(near) > 1 or best.excess > NEAR_NOISE else []
 
 

@@ -110,9 +110,8 @@ def _user(shaft: Array, start: Array, gear: Gear, T: float) -> Array:
     return out
 
 
-def swinging(plant: Actuator, data: Measured) -> Measured:
+def swinging(data: Measured, found: Resonance | None) -> Measured:
     """The cycles with the user starting as a gear that gives lets it, which no parabola tells; as they are if stiff."""
-    found = resonance(plant, data)
     if found is None:
         return data
     start = np.stack([found.starts[:, 0], data.start[:, 1]], axis=1)

@@ -51,7 +51,7 @@ def with_faults(search: Search, of_each: Array, point: Point) -> Search:
     """A search from the beginning with faults of each cycle, shape (n_cycles, 6), and noise as at their mean."""
     mean = of_each.mean(axis=0)
     old = search.plant
-    plant = EmaPlant(old.plant, replace(old.data, faults=of_each - mean), old.n_threads)
+    plant = EmaPlant(old.plant, replace(old.data, faults=of_each - mean), old.n_threads, old.resonance)
     plant.late, plant.work = old.late, old.work
     take_step(plant, old.step)
     noise = Noise(plant, {**point, **dict(zip(FAULTS, mean.tolist(), strict=True))})

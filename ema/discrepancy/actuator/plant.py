@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from ema.models.actuator import Actuator
 from ema.models.layout import STATE
 
 from .features import Signals, features, floors, slices, stacked
-from .gear import Resonance, resonance
+from .gear import Resonance
 from .measured import Measured
 from .runs import Asked, Memory, Runs, Work
 from .sampling import straightened
@@ -42,10 +41,12 @@ class EmaPlant:
     plant : Actuator
     data : Measured
     n_threads : int
+    resonance : Resonance, optional
+        Of the gear train, as rotor and user show it.
     """
 
-    def __init__(self, plant: Actuator, data: Measured, n_threads: int = 2):
-        self.plant, self.data, self.n_threads = plant, data, n_threads
+    def __init__(self, plant: Actuator, data: Measured, n_threads: int = 2, resonance: Resonance | None = None):
+        self.plant, self.data, self.n_threads, self.resonance = plant, data, n_threads, resonance
         self.work = Work()
         self.memory = Memory()
         self.step: float | None = None  # the one step that a record seems to have, where it was asked
@@ -59,11 +60,6 @@ class EmaPlant:
         groups = [features(plant, data.signals[c]) for c in self.first]
         self.slices = [slices(g) for g in groups]
         self.floors = [floors(g) for g in groups]
-
-    @cached_property
-    def resonance(self) -> Resonance | None:
-        """Of the gear train, as rotor and user show it."""
-        return resonance(self.plant, self.data)
 
     def neutral(self, name: str) -> float:
         """Value of a parameter that a point does not name: the plant file's own, or neutral."""

@@ -148,13 +148,19 @@ def _does_as_well(simpler: Screened, s: Screened, hardly: float) -> bool:
 
 
 def looking_like(
-    search: Search, model: Model, best: Model, screened: Sequence[Screened], fitted: set[str]
+    search: Search,
+    model: Model,
+    best: Model,
+    screened: Sequence[Screened],
+    fitted: set[str],
+    *,
+    only_there: bool = False,
 ) -> list[Screened]:
     """Those that can do, beside what else is free, nearly all that the last effect of `best` does.
 
     What probes do where nothing else acts may mislead: what resembles the effect there is asked once more where
     `best` is, and begins with what does the same there. So is what was fitted already, if the effect has taken the
-    place of faults: from these no fit gets there.
+    place of faults: from these no fit gets there. With `only_there` all are asked, and begin, where `best` is.
     """
     effect = best.effects[-1]
     names = [f"{effect.effect}.{name}" for name in effect.linear]
@@ -172,7 +178,7 @@ def looking_like(
         if c.effect in found or c.effect == effect.effect or (c.effect in fitted and not replaced):
             continue
         share = _doing(done, columns_of(search, c), own)
-        if share > COLLINEAR and c.effect not in fitted:
+        if share > COLLINEAR and c.effect not in fitted and not only_there:
             found[c.effect] = s
         elif share > RESEMBLING:
             J = _columns_at(search, best.fit.point, c)

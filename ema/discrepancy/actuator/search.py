@@ -46,9 +46,12 @@ class Search:
         start: Point,
         known: Columns | None,
         n_iterations: int,
+        to_beat: float = np.inf,
     ) -> Model:
         """Fit on training cycles, judge on held-out ones."""
-        fitted = fit(self.plant, self.noise, frees, start, self.train, known=known, n_iterations=n_iterations)
+        fitted = fit(
+            self.plant, self.noise, frees, start, self.train, known=known, n_iterations=n_iterations, to_beat=to_beat
+        )
         return self._judged(effects, fitted)
 
     def settled(self, model: Model) -> Model:

@@ -33,6 +33,16 @@ def is_alike(model: Model, best: Model) -> bool:
     return model.heldout - best.heldout < ALIKE * best.excess + more
 
 
+def leaves_noise(search: Search, model: Model) -> bool:
+    """Whether what a model leaves is noise. The misfit of noise is not one but where the noise was measured."""
+    return max(model.fit.misfit, model.heldout) < 1.0 + SLACK and search.verdict(model).is_noise
+
+
+def within_reach(best: Model) -> float:
+    """Misfit of training cycles up to which a model may turn out to be alike with the best."""
+    return best.fit.misfit + ALIKE * max(best.fit.misfit - 1.0, 0.0) + SLACK
+
+
 def is_credible(model: Model) -> bool:
     """Whether no parameter of the last effect is driven to what is physically credible at most."""
     effect = model.names[-1]
