@@ -16,7 +16,7 @@ from .comparators import PLAIN, take_step
 from .fit import fit
 from .model import CHANCE, FAR, Model, stripped
 from .noise import Noise, Verdict
-from .ridge import walked
+from .ridge import nearest, walked, without_common
 from .screening import AT_LEAST, Screened, looking_like, promising, simulated, start_with
 from .verdicts import NEARLY, as_on_the_bench, at_the_minimum, surely
 from .weighing import (
@@ -189,9 +189,9 @@ def extend(search: Search, model: Model, screened: Sequence[Screened], known: Se
     if not refined:
         return []
     best = min(refined.values(), key=lambda m: m.heldout)
-    is_found = leaves_noise(search, best)
-    for s in looking_like(search, model, best, screened, set(refined), only_there=is_found):
-        m = _instead(search, best, s) if is_found else _refined(search, model, s, within_reach(best))
+    near = model.excess < FAR
+    for s in looking_like(search, model, best, screened, set(refined), only_there=near):
+        m = _instead(search, best, s) if near else _refined(search, model, s, within_reach(best))
         effect = s.candidate.effect
         refined[effect] = min(m, refined.get(effect, m), key=lambda x: x.heldout)
     # A rival is out only if it leaves more when fitted as well as the best, or promises to.
@@ -210,9 +210,10 @@ def _for_several_faults(search: Search, model: Model, screened: Sequence[Screene
     if model.excess > FAR and screened[0].promised < NEARLY_ALL * _cost(model):
         return {}
     found: dict[str, Model] = {}
-    for s in screened:
-        if s.candidate.effect not in found and model.shows_faults_of(s.candidate):
-            found[s.candidate.effect] = m = _refined(search, model, s)
+    for s in nearest(search, model, [s for s in screened if model.shows_faults_of(s.candidate)]):
+        if s.candidate.effect not in found:
+            best = min(found.values(), key=lambda m: m.heldout, default=None)
+            found[s.candidate.effect] = m = _refined(search, model, s, within_reach(best) if best else np.inf)
             if leaves_noise(search, m):
                 break
     return found
@@ -250,10 +251,7 @@ def _refined(search: Search, model: Model, s: Screened, to_beat: float = np.inf)
     if model.shows_faults_of(s.candidate):
         # One effect for several faults, or for what they have in common, is the simpler cause; noise in the
         # columns would leave the faults there.
-        faults = s.candidate.faults
-        k = model.fit.point
-        common = min(k[name] for name in faults)
-        less = (dict.fromkeys(faults, 0.0), {name: k[name] - common for name in faults})
+        less = (dict.fromkeys(s.candidate.faults, 0.0), without_common(model, s.candidate))
         nearer, _ = search.better([start_with(search, model, s.candidate, rest) for rest in less], model)
         # From there the effect alone goes as far as it can.
         alone = fit(search.plant, search.noise, s.candidate.frees, nearer, search.train, n_iterations=3)
@@ -261,11 +259,12 @@ def _refined(search: Search, model: Model, s: Screened, to_beat: float = np.inf)
         if simpler_cost < NO_WORSE * cost:
             start = simpler
     made = search.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3, to_beat)
-    return walked(search, model, made, s.candidate) if model.shows_faults_of(s.candidate) else made
+    may_be_walked = model.shows_faults_of(s.candidate) and not made.fit.given_up
+    return walked(search, model, made, s.candidate) if may_be_walked else made
 
 
 def _instead(search: Search, best: Model, s: Screened) -> Model:
-    """A rival in the place of the last effect of `best`, which leaves noise, begun from where that is."""
+    """A rival in the place of the last effect of `best`, begun from where that is."""
     effects, frees, _ = stripped(best, best.effects[-1])
     free = (*frees, *s.candidate.frees)
     return search.model((*effects, s.candidate), free, s.start, best.fit.columns, 3, within_reach(best))

@@ -7,6 +7,7 @@ own, which no step by slopes leaves. So the ridge is walked, and a fit begins wh
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,8 +16,8 @@ from ema.discrepancy.plant import Point
 
 from .candidates import Candidate
 from .fit import fit
-from .model import Model
-from .screening import start_with
+from .model import FAR, Model
+from .screening import COLLINEAR, Screened, start_with
 
 if TYPE_CHECKING:
     from .search import Search
@@ -62,3 +63,29 @@ def _ridge(search: Search, model: Model, effect: Candidate) -> list[Point]:
         return {**end, **faults(s), **size}
 
     return [at((1.0 + j) / N_SHARES) for j in range(N_SHARES)]
+
+
+def nearest(search: Search, model: Model, screened: Sequence[Screened]) -> list[Screened]:
+    """Those that can stand for what several faults have in common, the one first that leaves least of that.
+
+    Simulated with the common part gone, and the effect as large as first order says: near the data an effect must do
+    as much of it as what looks alike does.
+    """
+    if not screened:
+        return []
+    less = [without_common(model, s.candidate) for s in screened]
+    ends = [start_with(search, model, s.candidate, rest) for s, rest in zip(screened, less, strict=True)]
+    points = [model.fit.point, *ends, *({**model.fit.point, **rest} for rest in less)]
+    far = model.excess > FAR
+    here, *there = search.costs(points, search.train, typical=far)
+    pairs = zip(there[: len(ends)], there[len(ends) :], strict=True)
+    left = [(end - here) / max(gone - here, 1e-9) for end, gone in pairs]
+    ranked = sorted(zip(left, screened, strict=True), key=lambda entry: entry[0])
+    return [s for share, s in ranked if far or share < 1.0 - COLLINEAR**2]
+
+
+def without_common(model: Model, effect: Candidate) -> Point:
+    """The faults that an effect can be mistaken for, less what they have in common."""
+    k = model.fit.point
+    common = min(k[name] for name in effect.faults)
+    return {name: k[name] - common for name in effect.faults}

@@ -62,7 +62,9 @@ class Search:
         return self._judged(model.effects, fitted)
 
     def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:
-        made = Model(tuple(effects), fitted, self._misfit(self.noise, fitted.point, self.heldout), self.noise)
+        n_seeds = N_GLANCE if fitted.given_up else N_FINAL
+        left = self._misfit(self.noise, fitted.point, self.heldout, n_seeds)
+        made = Model(tuple(effects), fitted, left, self.noise)
         self.tried.append(made)
         self.say.fitted(made.names, made.heldout, made.fit.point, by=self.noise)
         return made
@@ -71,8 +73,8 @@ class Search:
         """What `model` leaves on held-out cycles beyond another noise."""
         return max(self._misfit(noise, model.fit.point, self.heldout) - 1.0, 0.0)
 
-    def _misfit(self, noise: Noise, point: Point, cycles: Sequence[int]) -> float:
-        left = residuals(self.plant, noise, point, cycles, N_FINAL, FINAL_SEED)
+    def _misfit(self, noise: Noise, point: Point, cycles: Sequence[int], n_seeds: int = N_FINAL) -> float:
+        left = residuals(self.plant, noise, point, cycles, n_seeds, FINAL_SEED)
         return noise.misfit(list(left.values()), cycles)
 
     def verdict(self, model: Model) -> Verdict:
