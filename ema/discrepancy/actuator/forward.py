@@ -190,15 +190,23 @@ def extend(search: Search, model: Model, screened: Sequence[Screened], known: Se
         return []
     best = min(refined.values(), key=lambda m: m.heldout)
     near = model.excess < FAR
-    for s in looking_like(search, model, best, screened, set(refined), only_there=near):
-        m = _instead(search, best, s) if near else _refined(search, model, s, within_reach(best))
-        effect = s.candidate.effect
-        refined[effect] = min(m, refined.get(effect, m), key=lambda x: x.heldout)
+    for leader in _leaders(model, refined, best):
+        for s in looking_like(search, model, leader, screened, set(refined), only_there=near):
+            m = _instead(search, leader, s) if near else _refined(search, model, s, within_reach(leader))
+            effect = s.candidate.effect
+            refined[effect] = min(m, refined.get(effect, m), key=lambda x: x.heldout)
     # A rival is out only if it leaves more when fitted as well as the best, or promises to.
     for name, m in _close(refined, model):
         again = search.model(m.effects, m.fit.free, m.fit.point, None, 4, within_reach(best))
         refined[name] = min(m, again, key=lambda x: x.heldout)
     return sorted(refined.values(), key=lambda m: m.heldout)
+
+
+def _leaders(model: Model, refined: Mapping[str, Model], best: Model) -> list[Model]:
+    """The best, and the best that stands for several faults if it does as well: from these no fit finds its rivals."""
+    standing = [m for m in refined.values() if model.shows_faults_of(m.effects[-1]) and is_alike(m, best)]
+    instead = min(standing, key=lambda m: m.heldout, default=best)
+    return [best] if instead is best else [best, instead]
 
 
 def _for_several_faults(search: Search, model: Model, screened: Sequence[Screened]) -> dict[str, Model]:
