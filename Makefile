@@ -27,7 +27,7 @@ test-vcan: env
 test-systemd: env
 	$(BIN)/pytest -m systemd tests/systemd/test_machine.py
 
-# Attacks on a daemon process, four minutes; `make test-adversary LONG=--long` attacks more often. Writes the page's table.
+# Attacks on a daemon process, five minutes; `make test-adversary LONG=--long` attacks more often. Writes the page's table.
 LONG ?=
 test-adversary: env
 	$(BIN)/pytest -n 2 -m adversary tests/adversary $(LONG) --reliability docs/reliability.md
