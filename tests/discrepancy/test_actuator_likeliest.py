@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -11,7 +12,10 @@ from ema.discrepancy.actuator import examine as whole
 from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.free import K_FREE
+from ema.discrepancy.actuator.model import Model
 from ema.discrepancy.actuator.paths import Path
+from ema.discrepancy.engine.contest import Outcome
+from ema.discrepancy.engine.posterior import Entry
 
 DRAG = 7e-5
 STARTS = {"viscous_drag": {"viscous_drag.coefficient": DRAG}, "inertia": {"inertia.change": 0.1}}
@@ -33,6 +37,22 @@ def led_to(name):
         return replace(path, tried=list(search.tried), after=after, verdict=search.verdict(after), alike=[()])
 
     return search_is_led
+
+
+@pytest.mark.parametrize(
+    ("p", "named"),
+    [
+        ({("drag", "magnet_flux"): 0.004, ("drag",): 0.996}, False),  # faults do as well, and are far likelier
+        ({("drag", "magnet_flux"): 0.3, ("drag",): 0.7}, True),  # a set of both
+        ({("drag", "magnet_flux"): 0.9, ("drag",): 0.1}, True),
+        ({("drag", "magnet_flux"): 0.01, ("drag", "inertia"): 0.9, ("drag",): 0.09}, True),  # an effect, either
+        ({("drag", "magnet_flux"): 0.2, ("drag", "inertia"): 0.1, ("drag", "clock_skew"): 0.7}, False),
+    ],
+)
+def test_an_effect_that_faults_are_far_likelier_than_is_not_named(p, named):
+    outcome = Outcome([Entry(causes, of, 0.0, 0.0) for causes, of in p.items()], [])
+    answer = Model(tuple(SimpleNamespace(effect=name) for name in ("drag", "magnet_flux")), None, 1.0)
+    assert whole.is_named(outcome, answer, "magnet_flux", "inertia", "k4 and k5 alike") == named
 
 
 @pytest.mark.slow

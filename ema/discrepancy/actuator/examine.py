@@ -10,9 +10,11 @@ import numpy as np
 
 from ema.core.errors import RecordError
 from ema.core.records import Record
+from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.findings import Findings
 from ema.discrepancy.progress import Progress
 from ema.discrepancy.report import Picture
+from ema.effects import registry
 from ema.identification.alignment import aligned
 from ema.models import actuator_file
 from ema.models.actuator import Actuator
@@ -24,6 +26,7 @@ from .examination import Examination
 from .gear import resonance, swinging
 from .growing import beside, growing, said, widened
 from .measured import Measured
+from .model import Model
 from .next_recording import next_recording
 from .noise import Noise
 from .paths import beside_steady, faults_only, gone_on, resume, shortest, with_faults
@@ -44,6 +47,7 @@ from .weighing import is_credible
 
 MIN_CYCLES = 2
 NAMED = 0.5  # probability of an effect with all that the record cannot tell from it, from which it is named
+IN_SET = 0.05  # share of what is sure of a set, below which a member is none: the others are a set of 95 %
 N_BESIDE = 2  # turns in which faults of each cycle are found anew beside the effects
 
 
@@ -58,6 +62,16 @@ def split(data: Measured) -> tuple[list[int], list[int]]:
     if not heldout:  # every motion once: every second motion is held out
         train, heldout = sorted(train)[::2], sorted(train)[1::2]
     return sorted(train), sorted(heldout)
+
+
+def is_named(outcome: Outcome, model: Model, effect: str, *rivals: str) -> bool:
+    """Whether an effect of `model` is told as a cause: one of its set is likely, and that is not faults alone.
+
+    Faults are in every model: where they do as well in its place and are far likelier, nothing is missing.
+    """
+    p = dict(zip((effect, *rivals), probabilities(outcome, model, effect, *rivals), strict=True))
+    of_effects = sum(x for name, x in p.items() if name in registry())
+    return sum(p.values()) >= NAMED and of_effects >= IN_SET * sum(p.values())
 
 
 def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progress | None = None) -> Examination:
@@ -110,7 +124,7 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
     after, v = with_zero(search, after, v, alike)
     sets = [(name, *rivals) for name, rivals in zip(after.names, alike, strict=True)]
     outcome, models = weighed(search, before, after)
-    unlikely = [names[0] for names in sets if sum(probabilities(outcome, after, *names)) < NAMED]
+    unlikely = [names[0] for names in sets if not is_named(outcome, after, *names)]
     if unlikely and (not models[0].effects or is_credible(models[0])):
         say(f"{' + '.join(models[0].names) or 'faults only'} instead of {' + '.join(after.names)}")
         of = dict(zip(after.names, alike, strict=True))
