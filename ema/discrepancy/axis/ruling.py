@@ -1,8 +1,9 @@
 """The verdict by the balance of torque, where free runs cannot say.
 
-They know no neighbouring axis. And where noise alone makes more of a free run than there is motion in the record, or
-they are as good with a law as without it, they are no witness against what the balance sees: the verdict is then its
-own, of held-out blocks of torque, and says so.
+They know no neighbouring axis. And where noise alone makes much of the motion in a free run, and they are as good with
+a law as without it, they are no witness against what the balance sees: the verdict is then its own, of held-out blocks
+of torque, and says so. Where they follow the motion to within little and leave noise, the record is adequate whatever
+small thing the balance holds on to: it smooths what is shorter than its test functions, as the end of a reversal.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ if TYPE_CHECKING:
     from .plant import AxisPlant
 
 WORSE = 0.1  # of the mean square of the free runs' residual, that a law may add to it and not be refuted by them
+WITNESS = 0.1  # of the motion, that noise may make in free runs which are a witness
 NEIGHBOUR = "they know nothing of the neighbouring axis"
-BLIND = "they are no worse with what the balance names than without, so they cannot say"
+BLIND = "noise makes {:.0%} of the motion in them, and they are no worse with what the balance names than without"
 
 
 @dataclass(frozen=True)
@@ -56,9 +58,10 @@ def ruling(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
     if b.given:
         own = [_neighbour(b)] if _is_seen(b) else []
         return Ruling([*own, *of_balance(plant, b, missing(b, []))], _left(plant, b), NEIGHBOUR)
-    named = missing(b, []) if outcome.verdict == "adequate" else []
+    is_blind = outcome.verdict == "adequate" and outcome.heldout.noise_floor > WITNESS
+    named = missing(b, []) if is_blind else []
     if named and not _is_refuted(plant, outcome, b):
-        return Ruling(of_balance(plant, b, named), _left(plant, b), BLIND)
+        return Ruling(of_balance(plant, b, named), _left(plant, b), BLIND.format(outcome.heldout.noise_floor))
     return None
 
 

@@ -27,8 +27,9 @@ def plant_of(module, **hidden):
 FITTED = {"J": 0.14, "F_d": 0.25, "C": 0.02}  # as free runs would
 
 
-def as_free_runs_had(verdict):
-    return SimpleNamespace(verdict=verdict, point=FITTED)
+def as_free_runs_had(verdict, noise=0.5):
+    """As free runs of which noise makes a part of the motion."""
+    return SimpleNamespace(verdict=verdict, point=FITTED, heldout=SimpleNamespace(noise_floor=noise))
 
 
 def test_a_law_that_free_runs_are_blind_to_is_named_by_the_balance_which_says_so(short_pendulum):
@@ -37,6 +38,12 @@ def test_a_law_that_free_runs_are_blind_to_is_named_by_the_balance_which_says_so
     assert [e.name for e in said.effects] == ["pendulum"]
     assert "not of free runs" in said.note
     assert graded(said.left, named=True) in ("explained", "partly explained")
+
+
+def test_free_runs_that_follow_the_motion_and_leave_noise_keep_their_verdict(short_pendulum):
+    plant = plant_of(short_pendulum)
+    assert [t.law.name for t in plant.balance.terms] == ["pendulum"]
+    assert ruling(plant, as_free_runs_had("adequate", noise=0.01)) is None
 
 
 def test_where_the_balance_needs_no_law_free_runs_keep_their_verdict(short_pendulum):
