@@ -19,12 +19,12 @@ import numpy as np
 from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
-from .fit import Fit, bounded, bounds, column_steps, concluded, moved, residuals_at, stacked_jacobian
+from .fit import Fit, bounded, bounds, concluded, moved, residuals_at, stacked_jacobian
 from .free import Free
 from .noise import Noise
 
 if TYPE_CHECKING:
-    from .plant import EmaPlant, Steps
+    from .plant import EmaPlant
 
 FLAT = 0.3  # length of a direction over that of the longest, below which it is simulated itself
 N_SEEDS = 8  # of each half
@@ -75,8 +75,7 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
                 return fit
             break
         ways = scale * np.array([_difference(fit.free, *pair) for pair in ends])
-        (here,) = _halves(plant, noise, [point], cycles)
-        there = _halves(plant, noise, [p for pair in ends for p in pair], cycles, column_steps(plant))
+        here, *there = _halves(plant, noise, [point, *(p for pair in ends for p in pair)], cycles)
         probed = _learnt(J, ways, np.array(there[1::2]) - np.array(there[::2]))
         J = probed.J
         A, known, rows = _system(probed, here)
@@ -145,19 +144,15 @@ def _system(probed: Probed, r: Array) -> tuple[Array, Array, Array]:
     return A, known, rows
 
 
-def _by_cycle(
-    plant: EmaPlant, noise: Noise, points: Sequence[Point], cycles: Sequence[int], steps: Steps = None
-) -> list[dict[int, Array]]:
+def _by_cycle(plant: EmaPlant, noise: Noise, points: Sequence[Point], cycles: Sequence[int]) -> list[dict[int, Array]]:
     """Whitened residuals at several points by cycle, twice: shape (2, n_features)."""
-    first, second = (residuals_at(plant, noise, points, cycles, N_SEEDS, seed, steps) for seed in SEEDS)
+    first, second = (residuals_at(plant, noise, points, cycles, N_SEEDS, seed) for seed in SEEDS)
     return [{c: np.array([a[c], b[c]]) for c in cycles} for a, b in zip(first, second, strict=True)]
 
 
-def _halves(
-    plant: EmaPlant, noise: Noise, points: Sequence[Point], cycles: Sequence[int], steps: Steps = None
-) -> list[Array]:
+def _halves(plant: EmaPlant, noise: Noise, points: Sequence[Point], cycles: Sequence[int]) -> list[Array]:
     """Whitened residuals at several points, all cycles one behind the other, twice: shape (2, n_features of all)."""
-    found = _by_cycle(plant, noise, points, cycles, steps)
+    found = _by_cycle(plant, noise, points, cycles)
     return [np.concatenate([at[c] for c in cycles], axis=1) for at in found]
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ema.effects import registry
 from ema.effects.base import ABSENT
 
@@ -39,7 +41,12 @@ def leaves_noise(search: Search, model: Model) -> bool:
 
 
 def within_reach(best: Model) -> float:
-    """Misfit of training cycles up to which a model may turn out to be alike with the best."""
+    """Misfit of training cycles up to which a model may turn out to be alike with the best.
+
+    Far from the data first order promises nothing, and nobody is told out of reach by it.
+    """
+    if best.excess > DISTANT:
+        return np.inf
     return best.fit.misfit + ALIKE * max(best.fit.misfit - 1.0, 0.0) + SLACK
 
 
