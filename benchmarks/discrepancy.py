@@ -48,9 +48,7 @@ def examined(
     motions: Any, bench: Any, n_threads: int, spoiled: Callable[[Cycle], Cycle] = lambda cycle: cycle,
 ) -> dict[str, Any]:  # fmt: skip
     """Hide a flaw, look for it, and lay what is found beside what was hidden; `spoiled` is what a recorder does."""
-    flaws = hidden.Flaws(**values, **{f"k{j + 1}": x for j, x in enumerate(k)})
-    made = enumerate(hidden.cycles(flaws, n_cycles, seed, motions, bench))
-    record = Record(tuple(spoiled(Cycle(n, c)) for n, c in made))
+    record = recorded(values, k, n_cycles, seed, motions, bench, spoiled)
     begun = time.process_time()
     told = {"hidden": values, "k": k}
     try:
@@ -59,15 +57,37 @@ def examined(
         return {**told, "outcome": "refused", "said": [str(error)]}
     examination = examine(plant, data, n_threads=n_threads)
     cost = costs(examination.search.plant.work, time.process_time() - begun)
-    findings = examination.findings.as_dict()
+    scored = beside_truth(name, values, k, n_cycles, seed, motions, bench, examination.findings.as_dict())
+    return {**told, **scored, **cost}
+
+
+def recorded(
+    values: dict[str, float], k: list[float], n_cycles: int, seed: int, motions: Any, bench: Any,
+    spoiled: Callable[[Cycle], Cycle] = lambda cycle: cycle,
+) -> Record:  # fmt: skip
+    """The record of a flaw."""
+    made = enumerate(hidden.cycles(_flaws(values, k), n_cycles, seed, motions, bench))
+    return Record(tuple(spoiled(Cycle(n, c)) for n, c in made))
+
+
+def _flaws(values: dict[str, float], k: list[float]) -> Any:
+    return hidden.Flaws(**values, **{f"k{j + 1}": x for j, x in enumerate(k)})
+
+
+def beside_truth(
+    name: str, values: dict[str, float], k: list[float], n_cycles: int, seed: int, motions: Any, bench: Any,
+    findings: dict[str, Any],
+) -> dict[str, Any]:  # fmt: skip
+    """What is in findings.json, laid beside what was hidden."""
     found = {f"{e['name']}.{p}": q for e in findings["effects"] for p, q in e["parameters"].items()}
     true = {p: truth(values) for p, truth in cases.case(name).parameters.items() if p in found}
     sd = {p: (found[p]["high"] - found[p]["low"]) / 3.92 for p in true}
     gain = findings["gain"]
     outcome = cases.outcome(name, findings)
+    is_missed = outcome == "missed"
     return {
-        **told, "outcome": outcome, "verdict": findings["verdict"],
-        "visible": cases.visibility(hidden, flaws, n_cycles, seed, motions, bench) if outcome == "missed" else None,
+        "outcome": outcome, "verdict": findings["verdict"],
+        "visible": cases.visibility(hidden, _flaws(values, k), n_cycles, seed, motions, bench) if is_missed else None,
         "named": [[e["name"], *e["indistinguishable_from"]] for e in findings["effects"]],
         "confidence": [e["confidence"] for e in findings["effects"]],
         "parameter_errors": {p: found[p]["value"] / x - 1.0 for p, x in true.items() if x},
@@ -76,7 +96,7 @@ def examined(
         "k_after": gain["k_after"], "k_interval": gain.get("k_interval"), "z_k": _z_k(gain, k),
         "posterior": findings.get("posterior", [])[:5],
         "err_k_before": _err_k(gain["k_before"], k), "err_k_after": _err_k(gain["k_after"], k),
-        "false_alarms": [gain["false_alarms_before"], gain["false_alarms_after"]], **cost,
+        "false_alarms": [gain["false_alarms_before"], gain["false_alarms_after"]],
         "tried": findings["tried"][:8], "said": findings["structure"].get("sentences", []) + findings["notes"],
     }  # fmt: skip
 

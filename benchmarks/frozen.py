@@ -22,12 +22,13 @@ from benchmarks import strata
 from benchmarks.frozen_table import MixedCommitsError, of_one_commit, table
 
 ROOT = Path(__file__).resolve().parents[1]
+BENCHES = 100_000  # seeds of a bench's noise
 
 
-def commit() -> str:
+def commit(of: Path = ROOT) -> str:
     """The commit under test, with ``+`` behind it where tracked files differ from it."""
-    head = _git("rev-parse", "HEAD")
-    return head + ("+" if _git("status", "--porcelain", "--untracked-files=no") else "")
+    head = _git(of, "rev-parse", "HEAD")
+    return head + ("+" if _git(of, "status", "--porcelain", "--untracked-files=no") else "")
 
 
 def seed(commit: str, stratum: str, trial: int) -> int:
@@ -36,8 +37,8 @@ def seed(commit: str, stratum: str, trial: int) -> int:
     return int.from_bytes(digest[:4], "big")
 
 
-def _git(*words: str) -> str:
-    return subprocess.run(["git", *words], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
+def _git(of: Path, *words: str) -> str:
+    return subprocess.run(["git", *words], cwd=of, check=True, capture_output=True, text=True).stdout.strip()
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
@@ -129,9 +130,8 @@ def _trial(stratum: str, number: int, s: int, threads: int) -> dict[str, Any]:
     from benchmarks.discrepancy import examined
 
     t = strata.drawn(stratum, number, s)
-    bench = (t.n_cycles, s % 100_000, t.motions, t.bench, threads, t.spoil)
-    told = {"case": t.case, "plant": t.plant, "record": t.record, "effects": list(strata.hidden_effects(t.case))}
-    return {**told, **examined(t.actuator, t.case, t.values, t.k, *bench)}
+    bench = (t.n_cycles, s % BENCHES, t.motions, t.bench, threads, t.spoil)
+    return {**t.told, **examined(t.actuator, t.case, t.values, t.k, *bench)}
 
 
 if __name__ == "__main__":

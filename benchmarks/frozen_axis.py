@@ -16,7 +16,6 @@ from ema.core.errors import RecordError
 from ema.discrepancy.axis.between import examined
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.axis.wording import findings
-from ema.discrepancy.findings import Findings
 from ema.models.axis_config import LinearAxis, RotaryAxis
 
 
@@ -32,7 +31,7 @@ def main(trials: int, threads: int, out: Path | None, rows_file: Path | None, in
 
 def trial(t: strata_axis.Trial, threads: int) -> dict[str, Any]:
     """Look for what a trial hides, and lay what is found beside it."""
-    told = {"case": t.case, "plant": t.plant, "effects": list(t.effects), "near": list(t.near), "hidden": t.truth}
+    told = t.told
     model = LinearAxis if t.plant_file.get("motion") == "linear" else RotaryAxis
     begun = time.process_time()
     try:
@@ -43,31 +42,35 @@ def trial(t: strata_axis.Trial, threads: int) -> dict[str, Any]:
     except Exception as error:  # a defect: it counts against the finder, and the run goes on
         failed = {"outcome": "crashed", "verdict": "crashed", "named": [], "confidence": [], "z": {}}
         return {**told, **failed, "cpu_s": time.process_time() - begun, "said": [f"{type(error).__name__}: {error}"]}
-    said = found.as_dict()
+    return {**told, **beside_truth(t, found.as_dict()), "cpu_s": time.process_time() - begun}
+
+
+def beside_truth(t: strata_axis.Trial, said: dict[str, Any]) -> dict[str, Any]:
+    """What is in findings.json, laid beside what was hidden."""
+    effects = said["effects"]
     # of two lines of cogging the first, larger one is the one whose amplitude is told in the truth
-    quantities = {f"{e.name}.{name}": q for e in reversed(found.effects) for name, q in e.parameters.items()}
+    quantities = {f"{e['name']}.{name}": q for e in reversed(effects) for name, q in e["parameters"].items()}
     true = {name: x for name, x in t.truth.items() if name in quantities and name in strata_axis.EXACT}
-    sd = {name: (quantities[name].high - quantities[name].low) / 3.92 for name in true}
+    sd = {name: (quantities[name]["high"] - quantities[name]["low"]) / 3.92 for name in true}
     return {
-        **told, "outcome": outcome(t, found), "verdict": found.verdict,
-        "named": [[e.name, *e.indistinguishable_from] for e in found.effects],
-        "confidence": [e.confidence for e in found.effects],
-        "z": {name: (quantities[name].value - x) / sd[name] for name, x in true.items() if sd[name] > 0.0},
-        **said["gain"]["heldout"], "cpu_s": time.process_time() - begun,
-        "said": said["structure"].get("sentences", []),
+        "outcome": outcome(t, said), "verdict": said["verdict"],
+        "named": [[e["name"], *e["indistinguishable_from"]] for e in effects],
+        "confidence": [e["confidence"] for e in effects],
+        "z": {name: (quantities[name]["value"] - x) / sd[name] for name, x in true.items() if sd[name] > 0.0},
+        **said["gain"]["heldout"], "said": said["structure"].get("sentences", []),
     }  # fmt: skip
 
 
-def outcome(t: strata_axis.Trial, found: Findings) -> str:
+def outcome(t: strata_axis.Trial, findings: dict[str, Any]) -> str:
     """How the finder did: right, in set, wrong, missed."""
-    sets = [{e.name, *e.indistinguishable_from} for e in found.effects]
+    sets = [{e["name"], *e["indistinguishable_from"]} for e in findings["effects"]]
     wanted = set(t.effects)
     if not wanted and t.kind in strata_axis.OUTSIDE:
         is_near = bool(sets) and all(s & set(t.near) for s in sets)
-        said = "right" if is_near or (found.verdict == "unexplained" and not sets) else "wrong"
-        return "missed" if found.verdict == "adequate" else said
+        said = "right" if is_near or (findings["verdict"] == "unexplained" and not sets) else "wrong"
+        return "missed" if findings["verdict"] == "adequate" else said
     if not wanted:
-        return "right" if found.verdict == "adequate" else "wrong"
+        return "right" if findings["verdict"] == "adequate" else "wrong"
     if not sets:
         return "missed"
     if not all(s & wanted for s in sets):

@@ -42,6 +42,16 @@ class Trial:
         return as_actuator(hidden.PLANTS[self.plant])
 
     @property
+    def told(self) -> dict[str, Any]:
+        """What is hidden, for the trial's row."""
+        return {
+            "case": self.case,
+            "plant": self.plant,
+            "record": self.record,
+            "effects": list(hidden_effects(self.case)),
+        }
+
+    @property
     def spoil(self) -> Spoil:
         """What a recorder does to a cycle."""
         return RECORDS[self.record]

@@ -59,8 +59,14 @@ class Trial:
     near: tuple[str, ...] = ()
 
     @property
+    def told(self) -> dict[str, Any]:
+        """What is hidden, for the trial's row."""
+        hidden = {"effects": list(self.effects), "near": list(self.near), "hidden": self.truth}
+        return {"case": self.case, "plant": self.plant, **hidden}
+
+    @property
     def kind(self) -> str:
-        """What is hidden."""
+        """Its name without the bench."""
         return self.case.split(",")[0]
 
 
