@@ -28,6 +28,8 @@ def plant() -> None:
 @click.option("--name", default="bench", show_default=True, help="what to call it")
 @click.option("--pole-pairs", type=click.IntRange(1, 200), help="data sheet")
 @click.option("--gear", type=_POSITIVE, metavar="N", help="turns of the motor for one of the user, N:1")
+@click.option("--torque-at", type=click.Choice(["motor", "load"]), help="side of the gear of the torque sensor")
+@click.option("--measured-at", type=click.Choice(["motor", "load"]), help="side of the gear of position and speed")
 @click.option("--R", "R", type=_POSITIVE, metavar="OHM", help="phase resistance [ohm]")
 @click.option("--L", "L", type=_POSITIVE, metavar="H", help="phase inductance [H]")
 @click.option("--kv", type=_POSITIVE, metavar="RPM/V", help="speed constant, line to line [rpm/V]")

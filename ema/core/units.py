@@ -22,6 +22,7 @@ _AS_WRITTEN = (
     "newton_meter = newton * meter = Nm",
     "newton_millimeter = newton * millimeter = Nmm",
     "@alias turn = rev",
+    "@alias degree = Grad",
     "@alias revolutions_per_minute = RPM",
     "@alias ampere = Amp = amp = Amps = amps",
     "@alias volt = Volts = volts",

@@ -146,14 +146,14 @@ def _not_clipped(record: Record, names: tuple[str, ...], position: str) -> None:
         for limit in (limit for limit in (x.max(), x.min()) if limit != 0.0):  # at zero it rests
             share = float(np.mean(x == limit))
             longest = _longest_run(x == limit)
-            if share > 0.03 and longest >= 5 and (name != position or _is_cut_off(x, limit)):
+            if share > 0.03 and longest >= 5 and (name != position or is_cut_off(x, limit)):
                 raise RecordError(
                     f"{record.name}: {name} is clipped at {limit:g} {CHANNELS[name].unit} "
                     f"({share:.0%} of the samples): a longer range or a smaller motion is needed"
                 )
 
 
-def _is_cut_off(x: Array, limit: float) -> bool:
+def is_cut_off(x: Array, limit: float) -> bool:
     """Whether a position arrives at its limit without having slowed down, as no axis does that comes to rest there."""
     moves = np.abs(x[ENTERING:] - x[:-ENTERING])
     at = x == limit

@@ -15,6 +15,7 @@ from .facts import FALLEN, ChannelFacts, Sampling
 ACTUATOR = ("t", *CURRENTS, "theta_m", "theta_u", "theta_cmd")
 DRIVES = ("i_q", "torque", "force", "u_q", "duty", "w_ref")
 FEW = 500  # samples of a record from which a fit has something left to be tested with
+DUTY = 1.1  # largest duty cycle, with what a converter may add
 JITTERY = 0.2  # of a period, rms
 
 
@@ -72,6 +73,8 @@ def _channels(facts: list[ChannelFacts]) -> list[str]:
         elif one.held > 0.0:
             share = f"{100 * one.held:.1f} % of the samples"
             said.append(f"{one.name} is held at an end of its range for {share}: clipped, or a limit")
+        if one.name == "duty" and max(one.high, -one.low) > DUTY:
+            said.append(f"duty goes to {max(one.high, -one.low):g} where 1 is the whole supply: in per cent? unit: '%'")
         if one.name in DRIVES and one.upper > FALLEN:
             said.append(
                 f"{one.name} does not fall off before half the sampling rate ({100 * one.upper:.0f} % of its power "

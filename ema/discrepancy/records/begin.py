@@ -34,7 +34,8 @@ class Known:
 class Sheet:
     """What a data sheet says; None where it does not. Units: rpm/V, ohm (phase), H (phase), kg m², N m/A, V.
 
-    A `brushed` motor has the back-EMF constant of its torque; of three phases it is that of one.
+    A `brushed` motor has the back-EMF constant of its torque; of three phases it is that of one. `torque_at` and
+    `measured_at` are sides of the gear: of a torque sensor, and of position and speed.
     """
 
     pole_pairs: int | None = None
@@ -46,6 +47,15 @@ class Sheet:
     J: float | None = None
     V_dc: float | None = None
     brushed: bool = False
+    torque_at: str | None = None
+    measured_at: str | None = None
+
+    @property
+    def torque_ratio(self) -> float:
+        """A measured torque as it acts on the measured side, over what was recorded."""
+        at = (self.torque_at or "motor", self.measured_at or "motor")
+        gear = self.gear or 1.0
+        return {("load", "motor"): 1.0 / gear, ("motor", "load"): gear}.get(at, 1.0)
 
 
 def axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
@@ -75,10 +85,22 @@ def axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
         elif key == "V_dc" and drive == "duty" and "u_dc" not in have:
             known.append(Known(key, "24 V", "a guess: give --supply"))
     fit = first_fit(records, position, speed, _torques(records, drive, position, speed, sheet, k_t, k_e))
-    return [*known, *_mechanical(fit, sheet, linear=linear)]
+    return [*known, *_mechanical(fit, sheet, drive, linear=linear)]
 
 
-def _mechanical(fit: FirstFit, sheet: Sheet, *, linear: bool) -> list[Known]:
+def _gear(sheet: Sheet, drive: str) -> list[Known]:
+    """The gear, and on which side of it things were measured: often a torque is at the load."""
+    sides = {"measured_at": ("position, speed and inertia", sheet.measured_at)}
+    if drive == "torque":
+        sides["torque_at"] = ("the torque", sheet.torque_at)
+    known = [Known("gear", f"{sheet.gear:g}", "data sheet")]
+    for key, (what, said) in sides.items():
+        asked = f"a guess: give --{key.replace('_', '-')} load for {what} behind the gear"
+        known.append(Known(key, said or "motor", "as you said" if said else asked))
+    return known
+
+
+def _mechanical(fit: FirstFit, sheet: Sheet, drive: str, *, linear: bool) -> list[Known]:
     """Inertia, drag and friction, each with where it is from."""
     mass, unit = ("M", "kg") if linear else ("J", "kg m^2")
     beside = f", beside a torque of order {', '.join(f'{n:g}' for n in fit.orders)}" if fit.orders else ""
@@ -91,10 +113,7 @@ def _mechanical(fit: FirstFit, sheet: Sheet, *, linear: bool) -> list[Known]:
     ):
         origin = "data sheet" if given is not None else fitted if value is not None else guess
         known.append(Known(key, _number(next(x for x in (given, value, otherwise) if x is not None), its), origin))
-    if sheet.gear is not None:
-        known.append(
-            Known("gear", f"{sheet.gear:g}", "data sheet; measured_at: load where position and inertia are behind it")
-        )
+    known += [] if sheet.gear is None else _gear(sheet, drive)
     if sheet.pole_pairs and not linear:
         known.append(Known("p", str(sheet.pole_pairs), "data sheet"))
     fitted = f"[{mass}]" if sheet.J is None else "[]"
@@ -149,7 +168,7 @@ def _torques(
 
     def of(cycle: Cycle) -> Array:
         if drive not in ("u_q", "duty"):
-            return cycle[drive] * (k_t if drive == "i_q" else 1.0)
+            return cycle[drive] * {"i_q": k_t, "torque": sheet.torque_ratio}.get(drive, 1.0)
         supply = 1.0 if drive == "u_q" else cycle.channels.get("u_dc", sheet.V_dc)
         if sheet.R is None or supply is None:
             return np.zeros(cycle.n_samples)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ema.core.names import CHANNELS
 from ema.core.records import Array, Record
+from ema.discrepancy.axis.channels import is_cut_off
 from ema.discrepancy.axis.noise import estimate, quantum
 
 LONG = 1.5  # a step of time longer than so many median steps is a gap
@@ -16,6 +17,8 @@ HELD = 3  # samples in a row at a channel's end from which it is held there
 LEVELS = 5  # values from which a channel is more than a command between some levels
 # A parabola's top step lasts at most 1/(√2 - 1) = 2.4 times as long as the next one on both its sides; twice that.
 PARABOLA = 2.0 / (np.sqrt(2.0) - 1.0)
+POSITIONS = ("theta_m", "q", "theta_u", "theta_n")  # come to rest where they turn round, held by friction
+COMMANDS = ("theta_ref", "q_ref", "theta_cmd", "w_ref")  # may dwell where they like
 ENDS = 0.002  # share of a channel's samples at its end from which that is a limit, not a peak
 HIGH = (0.6, 0.95)  # upper part of the spectrum, of half the sampling rate
 FALLEN = 0.02  # power in that part, of all but the mean, below which a channel has fallen off [1]
@@ -110,18 +113,20 @@ def _channel(record: Record, name: str) -> ChannelFacts:
     noise = 0.0 if constant else estimate(record.cycles, name, record.resolution.get(name)).sigma
     step = 0.0 if constant else record.resolution.get(name) or max(quantum(part) for part in parts)
     upper = 0.0 if constant else max(_upper(part, noise) for part in parts)
-    return ChannelFacts(
-        name, CHANNELS[name].unit, low, high, float(step), float(noise), _held(parts, low, high, step), constant, upper
-    )
+    ends: tuple[float, ...] = () if name in COMMANDS else (low, high)
+    if name in POSITIONS:
+        ends = tuple(end for end in ends if not constant and is_cut_off(x, end))
+    held = _held(parts, ends, step)
+    return ChannelFacts(name, CHANNELS[name].unit, low, high, float(step), float(noise), held, constant, upper)
 
 
-def _held(parts: list[Array], low: float, high: float, step: float) -> float:
+def _held(parts: list[Array], ends: tuple[float, ...], step: float) -> float:
     """Share of samples in runs at an end; none are a cycle's rest before or after, and the levels of a command."""
-    if low == high or len(np.unique(np.concatenate(parts))) <= LEVELS:
+    if len(np.unique(np.concatenate(parts))) <= LEVELS:
         return 0.0
     n = 0
     for part in parts:
-        for end in (low, high):
+        for end in ends:
             runs, beside = _runs(part == end), _runs(np.abs(part - end) < 1.5 * step)
             inner = [(first, last) for first, last in runs if first > 0 and last < len(part) and last - first >= HELD]
             n += sum(last - first for first, last in inner if not _is_peak(first, last, beside))

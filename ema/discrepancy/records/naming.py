@@ -18,6 +18,9 @@ _SUPPLY = {"dc", "bus", "supply", "vbus", "udc", "vdc", "battery", "batt", "vsup
 _OUTPUT = {"user", "output", "load", "lvdt", "surface", "ram"}
 _PHASE = {"a": "i_a", "b": "i_b", "c": "i_c", "u": "i_a", "v": "i_b", "w": "i_c"}
 _PHASES = re.compile(r"(?:i|cur|current|phase|iphase|i ?phase)[ _]*([abcuvw])$")
+_DRIVES = ("current", "force", "torque", "duty")
+_SHARES = {"%", "percent", "pct", "per cent"}
+_WRITTEN = {"u/min": "rpm", "1/min": "rpm", "min-1": "rpm", "grad": "deg"}  # as a proposal; a file's own is not read so
 _COUNTS = {"count", "counts", "ticks", "cnt", "cnts", "inc", "increments", "lsb"}
 # What is measured, by its unit where the file gives one, else by the words of the title.
 _UNITS = {
@@ -50,30 +53,35 @@ class Proposal:
 
 
 def propose(table: Table) -> list[Proposal]:
-    """One proposal for each column of the file; each channel is proposed once, the first column that fits."""
+    """One proposal for each column of the file; each channel is proposed once, the first column that fits.
+
+    What was commanded is proposed for a drive only where nothing that was measured is.
+    """
     seen = [_quantity(title, table.units.get(index)) for index, title in enumerate(table.header)]
     is_linear = any(what in ("length", "force", "speed") for what, _ in seen)
     is_actuator = sum(_PHASES.search(_plain(title)) is not None for title in table.header) >= 2
     taken: dict[str, str] = {}
-    found: list[Proposal] = []
-    for title, (what, unit) in zip(table.header, seen, strict=True):
-        channel = _channel(title, what, is_linear, is_actuator)
-        if channel is not None and _is_counted(title, table.units.get(len(found))):
-            said = (
-                f"counts of an encoder: {{channel: {channel}, unit: turn, scale: 2.44140625e-4}} where 4096 are a turn"
-            )
-            found.append(Proposal(title, None, None, said))
+    found: dict[int, Proposal] = {}
+    for index in sorted(range(len(seen)), key=lambda k: _is_commanded_drive(table.header[k], seen[k][0])):
+        title, (what, unit) = table.header[index], seen[index]
+        channel = _channel(title, what, is_linear and unit is None, is_actuator)
+        if channel is not None and (said := _of_its_own_scale(title, table.units.get(index), channel)):
+            found[index] = Proposal(title, None, None, said)
         elif channel is None:
-            found.append(Proposal(title, None, None, "no channel of an axis or an actuator by its title and unit"))
+            found[index] = Proposal(title, None, None, "no channel of an axis or an actuator by its title and unit")
         elif channel in taken:
-            found.append(Proposal(title, None, None, f"looks like {channel} too, as '{taken[channel]}' does"))
+            found[index] = Proposal(title, None, None, f"looks like {channel} too, as '{taken[channel]}' does")
         else:
             taken[channel] = title
             said = CHANNELS[channel].meaning
+            if _is_commanded_drive(title, what):
+                said += "; commanded, and taken for what acts since no measured one is there"
             if unit is None and CHANNELS[channel].unit != "1":
-                said += f"; the file gives no unit: is it {CHANNELS[channel].unit}?"
-            found.append(Proposal(title, channel, unit or CHANNELS[channel].unit, said))
-    return found
+                own = titled(title)[1] or table.units.get(index)
+                unread = f"[{own}] is no unit that is known" if own else "the file gives no unit"
+                said += f"; {unread}: is it {CHANNELS[channel].unit}?"
+            found[index] = Proposal(title, channel, unit or CHANNELS[channel].unit, said)
+    return [found[index] for index in range(len(seen))]
 
 
 def _plain(title: str) -> str:
@@ -82,15 +90,29 @@ def _plain(title: str) -> str:
     return re.sub(r"[^a-z0-9]+", " ", name.lower()).strip()
 
 
-def _is_counted(title: str, apart: str | None) -> bool:
-    """Whether a column is in counts, whose angle only its owner knows."""
+def _is_commanded_drive(title: str, what: str | None) -> bool:
+    return what in _DRIVES and bool(set(_plain(title).split()) & _COMMAND)
+
+
+def _of_its_own_scale(title: str, apart: str | None, channel: str) -> str | None:
+    """What to write for a column in counts, or in per cent of a rating, which only its owner knows; None for others."""
     unit = titled(title)[1] or apart
-    return (unit.lower() if unit else _plain(title).split(" ")[-1]) in _COUNTS
+    last = (unit or titled(title)[0].split(" ")[-1].split("_")[-1]).strip().lower()
+    if last in _COUNTS:
+        return f"counts of an encoder: {{channel: {channel}, unit: turn, scale: 2.44140625e-4}} where 4096 are a turn"
+    its = CHANNELS[channel].unit
+    if last in _SHARES and its != "1":
+        return f"per cent of a rating: {{channel: {channel}, unit: {its}, scale: 0.025}} where 100 % are 2.5 {its}"
+    return None
+
+
+def _written(unit: str | None) -> str | None:
+    return None if unit is None else _WRITTEN.get(unit.lower().replace(" ", ""), unit)
 
 
 def _quantity(title: str, apart: str | None) -> tuple[str | None, str | None]:
     """What is measured and its unit, None where not known; a unit of the file counts more than a word."""
-    unit = titled(title)[1] or apart
+    unit = _written(titled(title)[1] or apart)
     if unit is not None:
         for what, target in _UNITS.items():
             if _converts(unit, target):
@@ -102,10 +124,14 @@ def _quantity(title: str, apart: str | None) -> tuple[str | None, str | None]:
         return next((what for what, target in _UNITS.items() if _converts(ending, target)), None), ending
     for what, known in _WORDS.items():
         if set(words) & set(known.split()):
+            if what == "duty":
+                return what, "%" if unit in _SHARES or words[-1] in _SHARES else None
             if (ending := _ending(title, what)) is None:
                 return what, None
             # a position may be of an angle or of a length, and so its speed: its unit says
             return next(((w, ending) for w, target in _UNITS.items() if _converts(ending, target)), (what, None))
+    if set(words) & _SUPPLY and _ending(title, "voltage"):
+        return "voltage", _ending(title, "voltage")
     return ("current", None) if _PHASES.search(_plain(title)) else (None, None)
 
 
@@ -114,7 +140,8 @@ def _ending(title: str, what: str) -> str | None:
     parts = re.split(r"[_ ]+", titled(title)[0].strip())
     if len(parts) > 2 and any(_converts("/".join(parts[-2:]), _UNITS[rate]) for rate in ("turning", "speed")):
         return "/".join(parts[-2:])  # joint_vel_deg_s
-    long = len(parts[-1]) > 1 or what == "time"  # a single letter is a phase more often than a unit
+    its = _UNITS.get(what, "")  # a single letter is a phase more often than a unit, but for what it is the unit of
+    long = len(parts[-1]) > 1 or (bool(its) and _converts(parts[-1], its))
     known = len(parts) > 1 and long and any(_converts(parts[-1], unit) for unit in _UNITS.values())
     return parts[-1] if known else None
 
@@ -128,8 +155,10 @@ def _converts(unit: str, target: str) -> bool:
 
 
 def _channel(title: str, what: str | None, is_linear: bool, is_actuator: bool) -> str | None:
+    """The channel; `is_linear`: a position or speed without a unit is of a linear axis, since others are."""
     words = set(_plain(title).split())
     is_command = bool(words & _COMMAND)
+    is_linear = is_linear or what in ("length", "speed", "force")
     if what in ("angle", "length"):
         if is_actuator:
             return "theta_cmd" if is_command else "theta_u" if words & _OUTPUT else "theta_m"
@@ -142,10 +171,12 @@ def _channel(title: str, what: str | None, is_linear: bool, is_actuator: bool) -
         return "v" if is_linear else "w_m"
     if what == "voltage":
         return "u_dc" if words & _SUPPLY else "u_q"
+    if words & _SUPPLY:  # its current is not the motor's
+        return None
     if what == "current" and (phase := _PHASES.search(_plain(title))) and is_actuator:
         return _PHASE[phase[1]]
     simple = {
         "time": "t", "current": "i_q", "force": "force", "torque": "torque", "duty": "duty", "temperature": "temp_w",
         "enabled": "enabled",
     }  # fmt: skip
-    return None if is_command else simple.get(what or "")
+    return None if is_command and what not in _DRIVES else simple.get(what or "")

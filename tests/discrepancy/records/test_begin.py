@@ -106,3 +106,16 @@ def test_a_voltage_or_a_duty_cycle_drives(channel, tmp_path):
     assert plant.k_e == plant.k_t == K_T
     assert pytest.approx(J, rel=0.05) == plant.J
     assert pytest.approx(F_D, rel=0.3) == plant.F_d
+
+
+def test_where_a_torque_behind_a_gear_was_measured_is_asked_for(tmp_path):
+    (cycle,) = bench().cycles
+    channels = {name: x for name, x in cycle.channels.items() if name != "i_q"} | {"torque": 50.0 * K_T * cycle["i_q"]}
+    record = Record((Cycle(0, channels),))
+    guessed = init(record, tmp_path, "--gear", "50").read_text()
+    assert "give --torque-at load" in guessed
+    (tmp_path / "plant.yaml").unlink()
+    (tmp_path / "bench.csv").unlink()
+    said = axis_config.load(init(record, tmp_path, "--gear", "50", "--torque-at", "load"))
+    assert (said.torque_at, said.measured_at) == ("load", "motor")
+    assert pytest.approx(J, rel=0.05) == said.J

@@ -59,6 +59,34 @@ def channels(answer):
                 "cmd (deg)": ("theta_cmd", "deg"), "Temp (°C)": ("temp_w", "°C"),
             },
         ),
+        (
+            "Zeit [ms],Tisch Position [mm],Motorwinkel [Grad],Motordrehzahl [U/min],Strom Iq [A],Soll Position [mm]",
+            "",
+            {
+                "Zeit [ms]": ("t", "ms"), "Tisch Position [mm]": ("q", "mm"), "Motorwinkel [Grad]": ("theta_m", "deg"),
+                "Motordrehzahl [U/min]": ("w_m", "rpm"), "Strom Iq [A]": ("i_q", "A"),
+                "Soll Position [mm]": ("q_ref", "mm"),
+            },
+        ),
+        (
+            "timestamp_us,goal_position_deg,present_position_deg,pwm_percent,supply_V,bus_current_A", "",
+            {
+                "timestamp_us": ("t", "us"), "goal_position_deg": ("theta_ref", "deg"),
+                "present_position_deg": ("theta_m", "deg"), "pwm_percent": ("duty", "%"), "supply_V": ("u_dc", "V"),
+                "bus_current_A": "ignore",
+            },
+        ),
+        (
+            "t [s],force cmd [N],x pos [mm]", "",
+            {"t [s]": ("t", "s"), "force cmd [N]": ("force", "N"), "x pos [mm]": ("q", "mm")},
+        ),
+        (
+            "t [s],torque cmd [N m],torque [N m],angle [deg]", "",
+            {
+                "t [s]": ("t", "s"), "torque cmd [N m]": "ignore", "torque [N m]": ("torque", "N m"),
+                "angle [deg]": ("theta_m", "deg"),
+            },
+        ),
     ],
 )  # fmt: skip
 def test_titles_and_units_of_strangers(tmp_path, titles, units, wanted):
@@ -70,6 +98,17 @@ def test_titles_and_units_of_strangers(tmp_path, titles, units, wanted):
 def test_a_unit_that_the_file_does_not_give_is_asked_for(tmp_path):
     _, answer = mapped(tmp_path, "time,position,current")
     assert "the file gives no unit: is it rad?" in answer.stdout
+
+
+def test_a_torque_in_per_cent_wants_its_rating(tmp_path):
+    _, answer = mapped(tmp_path, "Time (s),Position actual (deg),Torque actual (%)")
+    assert channels(answer)["Torque actual (%)"] == "ignore"
+    assert "{channel: torque, unit: N m, scale: 0.025} where 100 % are 2.5 N m" in answer.stdout
+
+
+def test_a_commanded_drive_is_said_to_be_one(tmp_path):
+    _, answer = mapped(tmp_path, "t [s],force cmd [N],x pos [mm]")
+    assert "commanded, and taken for what acts since no measured one is there" in answer.stdout
 
 
 def test_a_second_column_of_a_kind_is_left_out_and_said(tmp_path):
