@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from ema.core.records import Array
 
-Point = Mapping[str, float]  # values of free parameters by name; what is not named is neutral
+from .engine.hypothesis import Point as Point
 
 
 @dataclass(frozen=True)

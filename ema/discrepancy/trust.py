@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from .fitting import WILD, Fit
+from .grade import NAMED
 from .plant import Array, Candidate, Free, Plant
 from .progress import Progress
 from .rounds import State, is_explained, judged, leave_out
 from .selection import FORM, Tried, above_noise, alike, best_of, compare, is_nameless
-
-NAMED = 0.5  # probability of an effect with all that the data cannot tell from it, from which it is named
 
 
 def without_unlikely(plant: Plant, state: State, progress: Progress) -> dict[str, float]:

@@ -12,6 +12,7 @@ from ema.core.errors import RecordError
 from ema.core.records import Record
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.findings import Findings
+from ema.discrepancy.grade import NAMED
 from ema.discrepancy.progress import Progress
 from ema.discrepancy.report import Picture
 from ema.effects import registry
@@ -46,7 +47,6 @@ from .verdicts import at_the_minimum
 from .weighing import is_credible
 
 MIN_CYCLES = 2
-NAMED = 0.5  # probability of an effect with all that the record cannot tell from it, from which it is named
 IN_SET = 0.05  # share of what is sure of a set, below which a member is none: the others are a set of 95 %
 N_BESIDE = 2  # turns in which faults of each cycle are found anew beside the effects
 

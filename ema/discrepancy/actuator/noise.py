@@ -11,8 +11,8 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import gamma
 
 from ema.core.records import Array
+from ema.discrepancy.engine.hypothesis import Point
 from ema.discrepancy.engine.statistic import shrunk_correlation
-from ema.discrepancy.plant import Point
 
 from .runs import Runs
 from .thinning import spread

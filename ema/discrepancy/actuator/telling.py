@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
 FORM = 0.5  # of a value, for a rest as large as the whole effect: the interval holds what would take all of the rest
-NAMED = 0.95  # share of what faults alone leave that effects must explain to be named when a rest stays unexplained
+MOST_OF_IT = 0.95  # share of what faults alone leave that effects must explain to be named beside an unexplained rest
 UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: a rest is left that nothing explains
 IN_LIBRARY = 0.99  # probability that what does it is in the library at all, where it leaves nothing
 LOUD, MOST = 1.3, 0.5  # misfit of a cycle that shows a rest; share of it that is worth a word
@@ -55,7 +55,7 @@ def told(
     left = after.excess / max(before.excess, 1e-9)
     share = 1.0 - left
     is_beside = bool(odd) or not (v.is_noise or is_enough(after, before))  # of a rest that nothing explains
-    too_little = is_beside and share < NAMED
+    too_little = is_beside and share < MOST_OF_IT
     made = remains(search, before, after, v, odd, named=bool(kept) and not too_little)
     notes: list[str] = []
     shape: dict[str, Any] = {}

@@ -16,6 +16,7 @@
 `stamps`        time stamps that vary: whether samples do
 `external`      a torque from outside the motor beside its own cogging
 `zeros`         angle zeros of records given together
+`overlap`       where lines of two records lie over each other
 `stretch`       the search for a stretch of other friction
 `predictable`   how long windows may be
 `fading`        the search for the speed over which friction falls

@@ -11,14 +11,13 @@ from ema.discrepancy.plant import Candidate, Point
 from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
+from .balance.telling_records import INTERVAL
 from .cogging import MIN_LINE
 from .linear import by_drive, in_metres
 from .naming import numbers_of
 
 if TYPE_CHECKING:
     from .measured import Measured
-
-INTERVAL = (2.5, 97.5)  # percent
 
 
 def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Sequence[Point]) -> list[dict[str, Any]]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ema.core.records import Array
-from ema.discrepancy.fitting import Fit, best_fit
+from ema.discrepancy.fitting import WILD, Fit, best_fit
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Candidate, Free
 from ema.discrepancy.trust import at_bound
@@ -29,7 +29,6 @@ SHARE = 0.1  # of what is left above noise that it must take
 MOST = 3  # effects
 WIDER = (10.0, 100.0)  # times the bound
 N_ITERATIONS = 8
-WILD = 20.0  # whitened residuals beyond count the same
 
 
 def dropped(plant: AxisPlant, outcome: Outcome, named: set[str]) -> list[dict[str, Any]]:

@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.discrepancy import findings as shared
+from ema.discrepancy.grade import NAMED
 from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
 from .balance.as_effects import effects
 from .balance.found import Balance, Term
-from .balance.telling import INTERVAL, drawn
+from .balance.telling import drawn
+from .balance.telling_records import INTERVAL
 from .linear import in_metres
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
 
-LIKELY = 0.5  # confidence in a law, or those it is not told from, from which it is named where free runs have not
 ALONE = " (shown by the balance along the measured motion, not by free runs)"
 
 
@@ -27,7 +28,7 @@ def missing(b: Balance, found: Sequence[shared.FoundEffect]) -> list[Term]:
     """Likely laws that the library has as effects, and that nothing found stands for."""
     told = {name for e in found for name in (e.name, *e.indistinguishable_from)}
     new = [term for term in b.terms if (name := named(b, term)) and not {name, *term.law.also} & told]
-    return [term for term in new if b.of_set(term) >= LIKELY]
+    return [term for term in new if b.of_set(term) >= NAMED]
 
 
 def of_balance(plant: AxisPlant, b: Balance, terms: Sequence[Term]) -> list[shared.FoundEffect]:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ema.discrepancy.axis.zeros import between
+from ema.discrepancy.axis.overlap import between
 
 from .apart import by_record
 from .course import Course

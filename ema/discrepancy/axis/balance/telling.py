@@ -11,14 +11,10 @@ from ema.discrepancy.axis.linear import in_metres
 
 from .found import Balance, Term
 from .law import Law
-from .telling_records import by_record
+from .telling_records import INTERVAL, N_DRAWS, OF_BASE, SAID, by_record
 
-INTERVAL = (2.5, 97.5)  # percent
-N_DRAWS = 400
 BELOW = 2.0  # deviations below zero from which a value is implausible
 SURE, CONTRADICTED = 0.9, 0.1
-NAMES = {"inertia": "inertia", "dry_friction": "dry friction", "viscous_drag": "drag"}
-UNITS = {"inertia": "kg m^2", "dry_friction": "N m", "viscous_drag": "N m s/rad"}
 MADE_BY = {  # what makes a fitted value implausible
     "inertia": "a drive's torque that is late, or a gain of it that is wrong",
     "dry_friction": "drag in its place (one speed does not tell them apart), or a load that follows the motion",
@@ -69,11 +65,11 @@ def _base(b: Balance, k: int, name: str, samples: Array, linear: bool) -> dict[s
     more = 0.0 if name == "inertia" else nominal  # friction and drag are fitted beside the plant file's
     value = float(b.corrected.coefficients[k]) + more
     low, high = np.percentile(samples[:, k] + more, INTERVAL)
-    unit = in_metres(UNITS[name]) if linear else UNITS[name]
+    unit = in_metres(OF_BASE[name]) if linear else OF_BASE[name]
     out: dict[str, Any] = {"value": _short(value), "low": _short(low), "high": _short(high), "unit": unit}
     out["plant_file"] = nominal
     if value < -BELOW * float(np.std(samples[:, k])):
-        out["implausible"] = f"{NAMES[name]} cannot be negative: it may be {MADE_BY[name]}"
+        out["implausible"] = f"{SAID[name]} cannot be negative: it may be {MADE_BY[name]}"
     return out
 
 
@@ -110,7 +106,7 @@ def sentences(balance: dict[str, Any]) -> list[str]:
     """What an engineer would say of it."""
     what = "force" if balance["unit"] == "N" else "torque"
     share = balance["explained"]
-    base = ", ".join(_number(NAMES[name], q) for name, q in balance["base"].items())
+    base = ", ".join(_number(SAID[name], q) for name, q in balance["base"].items())
     base += "".join(f", and {law['sentence']}," for law in balance.get("given", ()))
     out = [f"Balance of {what} along the measured motion: {base} explain {share['fitted']:.1%} of the drive's {what}"]
     if balance["terms"]:
