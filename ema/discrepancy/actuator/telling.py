@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ema.core.names import FAULTS
-from ema.discrepancy.engine.contest import Outcome
+from ema.discrepancy.engine.contest import Outcome, Weighed
 from ema.discrepancy.engine.posterior import p_cause
 from ema.discrepancy.findings import WITHIN, Findings, FoundEffect, Gain, Quantity
 from ema.discrepancy.plant import Point
@@ -198,9 +198,8 @@ def _found(
 ) -> FoundEffect:
     """What was fitted as `effect`, told as that or as another effect with the same parameters.
 
-    With the probability and the sizes that all sets of causes together give it. An interval is the wider of theirs and
-    the fit's: the score knows no simulation but its own, and by itself claims 0.02 % of a compliance that another
-    simulation has 0.6 % off. `rest` is the amplitude of what is left above noise over that of what there was.
+    With the probability and the sizes that all sets of causes together give it, and an interval by both (`_sd`).
+    `rest` is the amplitude of what is left above noise over that of what there was.
     """
     e = registry()[told_as or effect]
     bounds = {f.name: f for f in model.fit.free}
@@ -211,7 +210,7 @@ def _found(
         name = f"{effect}.{p.name}"
         if name in bounds:
             value, own = sizes[name]
-            parts = [max(own, model.fit.sd[name]), IMPLEMENTATION * value, FORM * rest * value]
+            parts = [_sd(name, own, model, outcome), IMPLEMENTATION * value, FORM * rest * value]
             sd = float(np.linalg.norm([*parts, e.least_sd.get(p.name, 0.0)]))
             f = bounds[name]
             values[p.name] = value
@@ -254,11 +253,30 @@ def _gain(search: Search, before: Model, after: Model, made: Remains, outcome: O
     )
 
 
+def _weighed(model: Model, outcome: Outcome) -> Weighed | None:
+    """The set of a model's effects as it was weighed."""
+    return next((w for w in outcome.weighed if set(w.entrant.names) == set(model.names)), None)
+
+
+def _sd(name: str, score: float, model: Model, outcome: Outcome) -> float:
+    """Standard deviation of a parameter: that of the `score`, as much wider as the fit's is beside the same faults.
+
+    The score knows no simulation but its own, and by itself claims 0.02 % of a compliance that another simulation has
+    0.6 % off; the fit knows how motions and honest simulations scatter, but keeps faults free that the score has
+    dropped. Where a weaker magnet is alone for certain, its size does not share the doubt about three shorts beside it.
+    """
+    own, fit = _weighed(model, outcome), model.fit.sd.get(name, 0.0)
+    if own is None or name not in own.sd:
+        return max(score, fit)
+    beside_the_same = own.sd_beside([f.name for f in model.fit.free])[name]
+    return score * max(1.0, fit / beside_the_same) if beside_the_same > 0.0 else max(score, fit)
+
+
 def _interval_of_fault(name: str, model: Model, outcome: Outcome) -> tuple[float, float]:
-    """Interval of 95 %: the wider of the fit's and the score's, and where these disagree, both."""
+    """Interval of 95 %, by score and fit, and where these disagree, both."""
     k = model.fit.point.get(name, 0.0)
     sd = model.fit.sd.get(name, 0.0)
-    own = next((w for w in outcome.weighed if set(w.entrant.names) == set(model.names)), None)
+    own = _weighed(model, outcome)
     if own is not None and name in own.sd:
-        sd = float(np.hypot(max(sd, own.sd[name]), own.point[name] - k))
+        sd = float(np.hypot(_sd(name, own.sd[name], model, outcome), own.point[name] - k))
     return max(k - WITHIN * sd, 0.0), min(k + WITHIN * sd, 1.0)
