@@ -13,6 +13,7 @@ from scipy.stats import beta, norm
 Row = Mapping[str, Any]
 CONFIDENT = 0.9
 EXPLAINED = 1.2  # held-out error over noise, beyond which nothing may be called explained
+QUIET = ("adequate", "explained")  # verdicts by which nothing more is said to be missing
 VISIBLE = 1.2  # times what noise makes of the record; less cannot be missed
 INVENTED = 0.01  # a fault that is not there
 BINS = (0.0, 0.5, 0.8, 0.95, 1.0)
@@ -152,7 +153,7 @@ def _is_outside(row: Row) -> bool:
 
 def _is_unseen(row: Row) -> bool:
     visible = row.get("visible")
-    return row["outcome"] == "missed" and row["verdict"] == "adequate" and visible is not None and visible < VISIBLE
+    return row["outcome"] == "missed" and row["verdict"] in QUIET and visible is not None and visible < VISIBLE
 
 
 def _is_confidently_wrong(row: Row) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import re
 
+import hidden_actuator
+import hidden_cases
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -67,6 +69,22 @@ def test_what_cannot_be_seen_is_not_missed_and_what_can_is():
     hidden = {"outcome": "missed", "verdict": "adequate", "named": [], "confidence": [], "z": {}}
     text = frozen_table.table([row(), row(1, visible=1.05, **hidden), row(2, visible=3.0, **hidden)])
     assert cells(text, "named, or in a set that holds")[1].startswith("1 of 2")
+    assert cells(text, "hidden and not to be seen")[1] == "1 of 3"
+
+
+def test_what_is_missed_of_a_pair_is_judged_by_itself():
+    """A magnet is plain to see; that of a sag of a milliohm is not, whatever stands beside it."""
+    name, flaws = "magnet_flux + supply_sag", hidden_actuator.Flaws(flux=-0.06, source_resistance=1e-3)
+    findings = {"effects": [{"name": "magnet_flux", "indistinguishable_from": ["k4 and k5 alike"]}]}
+    assert hidden_cases.unseen(name, findings) == ["supply_sag"]
+    assert hidden_cases.unseen(name, {"effects": []}) == ["magnet_flux", "supply_sag"]
+    bench = (1, 5, hidden_actuator.MOTIONS[:1], hidden_actuator.BENCH)
+    magnet, sag = (
+        hidden_cases.visibility(hidden_actuator, flaws, part, *bench) for part in ("magnet_flux", "supply_sag")
+    )
+    assert sag < 0.1 * magnet
+    missed = {"outcome": "missed", "verdict": "explained", "effects": ["magnet_flux", "supply_sag"]}
+    text = frozen_table.table([row(), row(1, visible=1.1, **missed), row(2, visible=1.3, **missed)])
     assert cells(text, "hidden and not to be seen")[1] == "1 of 3"
 
 

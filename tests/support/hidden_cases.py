@@ -211,12 +211,18 @@ def draw_bench(hidden: Any, name: str, seed: int) -> tuple[Any, Any]:
     return motions, bench._replace(position=0.0) if local else bench
 
 
-def visibility(hidden: Any, flaws: Any, n: int, seed: int, motions: Any, bench: Any) -> float:
-    """What a flaw makes of the record over what chance makes of it, in the channel that shows it best."""
-    same = {name: getattr(flaws, name) for name in ("k1", "k2", "k3", "k4", "k5", "k6", "phi")}
+def unseen(name: str, findings: dict[str, Any]) -> list[str]:
+    """Parts of a case that the answer does not name; each is there or not whatever stands beside it."""
+    told = {effect for e in findings["effects"] for effect in (e["name"], *e["indistinguishable_from"])}
+    return [part for part in (name.split(" + ") if name not in CASES else [name]) if not told & {*case(part).effects}]
+
+
+def visibility(hidden: Any, flaws: Any, part: str, n: int, seed: int, motions: Any, bench: Any) -> float:
+    """What one part of a flaw makes of the record over what chance makes of it, in the channel that shows it best."""
+    neutral = hidden.Flaws()
+    without = flaws._replace(**{x: getattr(neutral, x) for x in case(part).draw(np.random.default_rng(0))})
     flawed, sound, again = (
-        hidden.cycles(f, n, s, motions, bench)
-        for f, s in ((flaws, seed), (hidden.Flaws(**same), seed), (hidden.Flaws(**same), seed + 500_000))
+        hidden.cycles(f, n, s, motions, bench) for f, s in ((flaws, seed), (without, seed), (without, seed + 500_000))
     )
     smooth = np.ones(50) / 50.0
 
