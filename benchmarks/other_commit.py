@@ -40,7 +40,7 @@ def as_given(row: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any], tuple
     bench = (a.n_cycles, a_seed(row), a.motions, a.bench)
     record = discrepancy.recorded(a.values, a.k, *bench, a.spoil)
     told = {**a.told, "hidden": a.values, "k": a.k}
-    file = a.actuator.model_dump(mode="json", exclude_defaults=True, by_alias=True)
+    file = {"kind": "ema", **a.actuator.model_dump(mode="json", exclude_defaults=True, by_alias=True)}
     return told, file, (record,), lambda said: discrepancy.beside_truth(a.case, a.values, a.k, *bench, said)
 
 

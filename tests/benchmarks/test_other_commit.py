@@ -8,7 +8,8 @@ import subprocess
 import pytest
 from click.testing import CliRunner
 
-from benchmarks import frozen, other_commit, strata_axis
+from benchmarks import frozen, other_commit, strata, strata_axis
+from ema.models import actuator_file
 
 ROW = {"commit": "a" * 40, "stratum": "one effect", "number": 0, "seed": 3}
 
@@ -71,3 +72,11 @@ def test_no_answer_is_a_refusal_where_it_says_so_and_else_a_crash(tmp_path, chec
     (row,) = frozen.read_rows(out)
     assert row["outcome"] == outcome
     assert row["said"] == ["no such plant"]
+
+
+def test_the_plant_file_of_a_trial_is_the_plant_of_the_trial(tmp_path):
+    row = {"commit": "a" * 40, "stratum": "nothing", "number": 0, "seed": 7, "k": [0.0] * 6}
+    _, file, _, _ = other_commit.as_given(row)
+    path = tmp_path / "plant.yaml"
+    path.write_text(json.dumps(file), encoding="utf-8")
+    assert actuator_file.load(path) == strata.drawn("nothing", 0, 7).actuator
