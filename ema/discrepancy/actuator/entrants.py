@@ -120,5 +120,5 @@ def _column(search: Search, known: dict[tuple[int, str], Array], name: str) -> A
 def _whitening(problem: ActuatorProblem, noise: Noise) -> Whitening:
     """The noise that the search has measured, as the engine wants it."""
     sd = np.concatenate([noise.of(c).sd for c in problem.cycles])
-    factors = {m: of.L for m, of in enumerate(noise.motions)}
-    return Whitening(sd, factors, tuple(problem.blocks), range(SEED, SEED + RUNS))
+    roots = {m: of.root for m, of in enumerate(noise.motions)}
+    return Whitening(sd, roots, tuple(problem.blocks), range(SEED, SEED + RUNS))

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import gamma
 
 from ema.core.records import Array
 from ema.discrepancy.engine.hypothesis import Point
-from ema.discrepancy.engine.statistic import shrunk_correlation
+from ema.discrepancy.engine.statistic import Root
 
 from .runs import Runs
 from .thinning import spread
@@ -36,8 +35,8 @@ class MotionNoise:
     ----------
     sd : array, shape (n_features,)
         With the floor of each feature.
-    L : array, shape (n_features, n_features)
-        Cholesky factor of the correlation.
+    root : Root
+        Of the inverse of the correlation.
     envelope_sd : array
         Of the envelope. [A]
     fresh : array, shape (n_fresh, n_features)
@@ -47,19 +46,14 @@ class MotionNoise:
     """
 
     sd: Array
-    L: Array
+    root: Root
     envelope_sd: Array
     fresh: Array
     step: np.ndarray
 
     def white(self, x: Array) -> Array:
         """Whitened rows of `x`, shape (..., n_features)."""
-        return whitened(self.L, x / self.sd)
-
-
-def whitened(L: Array, x: Array) -> Array:
-    """L⁻¹ times each row of `x`, shape (..., n_features)."""
-    return np.asarray(solve_triangular(L, np.atleast_2d(x).T, lower=True, check_finite=False).T.reshape(np.shape(x)))
+        return self.root(x / self.sd)
 
 
 def _repeats(plant: EmaPlant, motion: int, n_runs: tuple[int, int]) -> tuple[list[int], int]:
@@ -105,9 +99,8 @@ def motion_noise(plant: EmaPlant, motion: int, runs: Runs, n_runs: tuple[int, in
     x, new = np.split(deviations(runs.features + floor), [n_seen])
     step = (np.arange(n) % len(plant.noise_steps)).reshape(len(cycles), each).T.ravel()[n_seen:]
     sd = np.sqrt((x**2).mean(axis=0))
-    z = x / sd
-    L = cholesky(shrunk_correlation(z), lower=True, check_finite=False)
-    return MotionNoise(sd, L, deviations(runs.envelopes).std(axis=0), whitened(L, new / sd), step)
+    root = Root.of(x / sd)
+    return MotionNoise(sd, root, deviations(runs.envelopes).std(axis=0), root(new / sd), step)
 
 
 class Noise:

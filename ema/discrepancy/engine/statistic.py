@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from .records import Simulated
 
 RECORDS_PER_DIRECTION = 3  # simulated records for each statistic whose covariance they tell
+FLAT = 1e-10  # of the largest variance, below which there is none
 FAINT = 1e-2  # length of a direction over the longest, below which no candidate moves it apart from others
 
 
@@ -25,11 +27,10 @@ def shrinkage(z: Array) -> float:
     n, d = z.shape
     if d == 1:
         return 0.0
-    r = z.T @ z / (n - 1)
-    second = (z**2).T @ (z**2) / (n - 1)
-    variance = (second - r**2) / n
-    off = ~np.eye(d, dtype=bool)
-    return float(np.clip(variance[off].sum() / max((r[off] ** 2).sum(), 1e-300), 0.02, 1.0))
+    squares = z**2  # sums over all pairs i, j by the products of rows, of which there are few
+    second = float((squares.sum(axis=1) ** 2).sum() - (squares**2).sum()) / (n - 1)
+    r = (float(((z @ z.T) ** 2).sum()) - float((squares.sum(axis=0) ** 2).sum())) / (n - 1) ** 2
+    return float(np.clip((second - r) / n / max(r, 1e-300), 0.02, 1.0))
 
 
 def shrunk_correlation(z: Array) -> Array:
@@ -40,11 +41,43 @@ def shrunk_correlation(z: Array) -> Array:
 
 
 @dataclass(frozen=True)
+class Root:
+    """The symmetric root of the inverse of a `shrunk_correlation`, by its few directions beside the unit matrix.
+
+    Attributes
+    ----------
+    directions : array, shape (n_features, n)
+        Orthonormal: those in which the rows differ that it is made of.
+    along, across : array (n,), float
+        What the root multiplies by along each of them, and across all.
+    """
+
+    directions: Array
+    along: Array
+    across: float
+
+    @classmethod
+    def of(cls, z: Array) -> Root:
+        """From standardised rows (n, n_features)."""
+        own = shrinkage(z)
+        variance, rows = np.linalg.eigh(z @ z.T / len(z))
+        kept = variance > FLAT * variance[-1]
+        variance, rows = variance[kept], rows[:, kept]
+        directions = z.T @ rows / np.sqrt(len(z) * variance)
+        return cls(directions, 1.0 / np.sqrt(own + (1.0 - own) * variance), 1.0 / np.sqrt(own))
+
+    def __call__(self, x: Array) -> Array:
+        """Whitened rows of standardised `x`, shape (..., n_features)."""
+        along = x @ self.directions
+        return np.asarray(self.across * x + (along * (self.along - self.across)) @ self.directions.T)
+
+
+@dataclass(frozen=True)
 class Whitening:
-    """Standard deviations (n_features,) and the factor of each kind of block; made of the runs of `seeds`."""
+    """Standard deviations (n_features,) and what whitens each kind of block; made of the runs of `seeds`."""
 
     sd: Array
-    factors: dict[int, Array]
+    roots: Mapping[int, Callable[[Array], Array]]
     blocks: tuple[Block, ...]
     seeds: range
 
@@ -53,7 +86,7 @@ class Whitening:
         z = np.atleast_2d(x / self.sd)
         out = np.empty_like(z)
         for at, kind in self.blocks:
-            out[:, at] = solve_triangular(self.factors[kind], z[:, at].T, lower=True, check_finite=False).T
+            out[:, at] = self.roots[kind](z[:, at])
         return np.asarray(out.reshape(np.shape(x)))
 
 

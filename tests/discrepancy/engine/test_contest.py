@@ -8,7 +8,7 @@ import pytest
 from ema.discrepancy.engine.contest import Contest, Entrant, Outcome
 from ema.discrepancy.engine.posterior import p_cause
 from ema.discrepancy.engine.records import OwnRecordsError, Pool, seeds, simulated
-from ema.discrepancy.engine.statistic import Prediction, Statistic
+from ema.discrepancy.engine.statistic import Prediction, Root, Statistic, shrinkage, shrunk_correlation
 
 NAMES = ("a", "b", "c")
 
@@ -152,3 +152,17 @@ def test_the_error_of_the_evidence_is_what_other_records_would_move_it_by(toys):
         z.append(w.log_evidence)
         errors.append(w.error)
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) / np.std(z) < 2.0
+
+
+def test_the_root_of_a_correlation_whitens_as_the_whole_matrix_does():
+    """More features than rows: the same squares as by the inverse, at the price of the rows."""
+    rng = np.random.default_rng(17)
+    z = rng.standard_normal((20, 60)) @ (np.eye(60) + 0.4 * np.eye(60, k=2))
+    z /= np.sqrt((z**2).mean(axis=0))
+    x, y = rng.standard_normal((2, 5, 60))
+    root = Root.of(z)
+    assert root(x) @ root(y).T == pytest.approx(x @ np.linalg.solve(shrunk_correlation(z), y.T), rel=1e-9)
+    r = z.T @ z / 19
+    off = ~np.eye(60, dtype=bool)
+    variance = ((z**2).T @ (z**2) / 19 - r**2) / 20
+    assert shrinkage(z) == pytest.approx(variance[off].sum() / (r[off] ** 2).sum(), rel=1e-9)

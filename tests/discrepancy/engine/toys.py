@@ -71,7 +71,8 @@ class Toy:
         cov = self.noise**2 * self.mixing @ self.mixing.T + np.diag(self.floors**2)
         sd = np.sqrt(np.diag(cov))
         of = {b.kind: np.linalg.cholesky((cov / np.outer(sd, sd))[b.at, b.at]) for b in self.blocks}
-        return Whitening(sd, of, self.blocks, seeds)
+        roots = {kind: lambda x, L=L: np.linalg.solve(L, x.T).T for kind, L in of.items()}
+        return Whitening(sd, roots, self.blocks, seeds)
 
 
 def plant(
