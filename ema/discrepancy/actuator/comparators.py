@@ -17,6 +17,7 @@ from .plant import NOISE_STEPS, STEPS, EmaPlant
 
 # [s] roughly: a whole number makes a control period
 TRIED = (2.5e-7, 5e-7, 1e-6, 1.5e-6, 2e-6, 3e-6, 4e-6, 5e-6, 7e-6, 1e-5, 1.4e-5, 2e-5)
+COARSELY = (5e-7, 2e-6, 5e-6, 1.4e-5)  # [s] of these: where none leaves less, none between them does
 FELT = 0.05  # difference in misfit; less is chance
 AROUND = (1.0, 1.25, 0.8)  # times the step, for the noise: what is left unknown of it
 CLEAR = 0.7  # share of what is left that another step may leave to be taken instead
@@ -26,8 +27,12 @@ PLAIN = 0.3  # the same where effects have not been looked for: no other flaw go
 def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int], share: float) -> float | None:
     """The integration step with which `point` leaves less than a share of what is left now, None without one. [s]"""
     now = excess_at(plant, noise, point, cycles)
-    tried = [_dividing(plant, about) for about in TRIED]
-    left = {step: excess_at(plant, noise, point, cycles, (step,)) for step in tried}
+    if now < FELT:
+        return None
+    left = {step: excess_at(plant, noise, point, cycles, (step,)) for step in _steps(plant, COARSELY)}
+    if min(left.values()) > now - FELT:  # what a step makes of a record grows with it, and evenly
+        return None
+    left |= {step: excess_at(plant, noise, point, cycles, (step,)) for step in _steps(plant, TRIED)}
     best = max(step for step, x in left.items() if x < min(left.values()) + FELT)  # the coarser, the cheaper
     return best if left[best] < min(share * now, now - FELT) else None
 
@@ -37,6 +42,10 @@ def take_step(plant: EmaPlant, step: float | None) -> None:
     plant.step = step
     plant.steps = STEPS if step is None else (step,)
     plant.noise_steps = NOISE_STEPS if step is None else tuple(_dividing(plant, step * factor) for factor in AROUND)
+
+
+def _steps(plant: EmaPlant, about: Sequence[float]) -> list[float]:
+    return [_dividing(plant, step) for step in about]
 
 
 def _dividing(plant: EmaPlant, about: float) -> float:

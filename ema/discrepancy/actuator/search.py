@@ -117,10 +117,10 @@ class Search:
         without = self._misfit(self.noise, {**model.fit.point, **neutral}, cycles)
         return without - (model.fit.misfit if in_training else model.heldout)
 
-    def without(self, model: Model, effect: Candidate) -> Model:
+    def without(self, model: Model, effect: Candidate, to_beat: float = np.inf) -> Model:
         """The model fitted anew without one of its effects."""
         effects, frees, point = stripped(model, effect)
-        return self.model(effects, frees, point, model.fit.columns, 3)
+        return self.model(effects, frees, point, model.fit.columns, 3, to_beat)
 
     def instead(self, model: Model, effect: Candidate, rival: Model) -> Model:
         """The model fitted anew with the last effect of `rival` in the place of one of its own."""

@@ -54,15 +54,12 @@ def at_the_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, Ver
     """`model` with faults and effects told apart that look nearly the same, as far as the record allows."""
     if not model.effects or model.excess > DISTANT or search.is_settled(model):
         return model, v
-    model, v = _at_the_minimum(search, model, v)
+    model, v = _at_the_minimum(search, *begun_again(search, model, v))
     search.minima.append((model.fit, search.noise))
     return model, v
 
 
 def _at_the_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
-    again = _begun_again(search, model)
-    if again is not model:
-        model, v = again, search.verdict(again)
     found = search.settled(model)
     if found.heldout <= model.heldout + CHANCE:
         return found, search.verdict(found)
@@ -70,7 +67,7 @@ def _at_the_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, Ve
     return replace(model, fit=replace(model.fit, sd=sd)), v
 
 
-def _begun_again(search: Search, model: Model) -> Model:
+def begun_again(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     """`model`, or where that leaves less, fitted anew from sensors whose gains (or offsets) have nothing in common.
 
     Sensors that all read too high, and a lighter rotor with less drag and friction, balance the torque alike. A ridge
@@ -84,5 +81,5 @@ def _begun_again(search: Search, model: Model) -> Model:
             made = search.model(model.effects, model.fit.free, start, None, 6)
             if search.left_more(made, model, (search.noise,)) < -CHANCE:
                 search.say(f"{effect.effect} without {common:.2g} in all phases leaves less")
-                return made
-    return model
+                return made, search.verdict(made)
+    return model, v
