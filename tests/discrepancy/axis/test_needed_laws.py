@@ -103,7 +103,7 @@ def test_what_a_law_does_is_no_doubt_of_it():
 
 def test_of_two_that_each_act_in_a_part_of_the_blocks_none_is_clearly_better():
     one_, two = (law(f"{f} Hz", lambda m, f=f: np.sin(2.0 * np.pi * f * m.t)) for f in (7, 9))
-    first = M.t < 0.6 * M.t[-1]
+    first = M.t < 0.72 * M.t[-1]
     found = made(np.where(first, one_.columns(M, None)[0], two.columns(M, None)[0]) * 0.05)
     better, worse = fitted(found, PLAIN, [one_]), fitted(found, PLAIN, [two])
     assert worse.loss - better.loss > 0.1 * worse.loss
