@@ -189,6 +189,7 @@ def test_what_is_no_law_of_the_error_is_not_taken_for_one(hidden, shipped_plant,
     [
         (lambda e: 3e3 * (np.clip(e, -1e-3, 1e-3) - e), "as if errors were cut off at 0.001 rad"),
         (lambda e: -3e3 * np.clip(e, -1e-3, 1e-3), "as if errors below 0.001 rad were ignored"),
+        (lambda e: -3e3 * np.clip(e, -3e-5, 3e-5), "as if errors below 3e-05 rad were ignored"),
         (lambda e: 2e3 * np.abs(e), None),
         (lambda e: np.sin(4e3 * e), None),
     ],

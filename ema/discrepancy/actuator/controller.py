@@ -124,7 +124,7 @@ def said_of_error(found: dict[str, Any] | None) -> list[str]:
 
 def _as_if(at: Array, current: Array, gain: float) -> str:
     """The law of one number that a function of the position error is, in words; nothing where it is neither."""
-    sizes = np.linspace(0.0, float(np.abs(at).max()), 201)[1:-1, None]
+    sizes = float(np.abs(at).max()) * np.geomspace(1e-3, 1.0, 300)[:-1, None]
     within = gain * np.clip(at, -sizes, sizes)
     laws = {"below {:.2g} rad were ignored": -within, "were cut off at {:.2g} rad": within - gain * at}
     lost = {law: ((current - of) ** 2).sum(axis=1) for law, of in laws.items()}
