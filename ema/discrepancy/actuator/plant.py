@@ -24,6 +24,7 @@ from .gear import Resonance
 from .measured import Measured
 from .runs import Asked, Memory, Runs, Work
 from .sampling import straightened
+from .supply import resolved
 
 Steps = tuple[float, ...] | None  # None: the plant's
 STEPS = (1e-6, 8e-7)  # [s] integration steps of a mean
@@ -60,6 +61,11 @@ class EmaPlant:
         groups = [features(plant, data.signals[c]) for c in self.first]
         self.slices = [slices(g) for g in groups]
         self.floors = [floors(g) for g in groups]
+        supply = [at["supply"] for at in self.slices if "supply" in at]
+        trusted = resolved(data, supply) if supply else None
+        if trusted is not None:
+            for floor, of in zip(self.floors, supply, strict=True):
+                floor[of] = trusted
 
     def neutral(self, name: str) -> float:
         """Value of a parameter that a point does not name: the plant file's own, or neutral."""
