@@ -1,7 +1,8 @@
 """Effects that are tried where the balance of torque shows their law, begun where the regression found them.
 
 What no axis without them shows needs no place in the search of every record: each candidate more is one more that
-noise may favour.
+noise may favour. A law that the balance cannot tell from the one it found is tried too: free runs may tell them, or
+have both in a set with what the balance does not see.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 from ema.models.axis_config import LINES, Axis
 
-from .balance.as_effects import effects, line_point
+from .balance.as_effects import effects, instead, line_point
 from .balance.found import Balance
 
 SCREENED = (
@@ -31,7 +32,7 @@ def screened(balance: Balance | None, plant: Axis, point: Point) -> list[Candida
     have = {name.split(".")[0] for name in point} | set(plant.effects)
     out = []
     for term in balance.terms:
-        for name, values in effects(balance, term).items():
+        for name, values in (instead(balance, term) | effects(balance, term)).items():
             if name not in SCREENED:
                 continue
             if name not in LINES:

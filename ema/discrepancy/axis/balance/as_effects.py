@@ -12,6 +12,7 @@ from ema.discrepancy.plant import Point
 from ema.models.axis_config import LINES
 
 from .found import Balance, Term
+from .law import Law
 
 Effects = dict[str, dict[str, float]]
 Values = Mapping[str, float]
@@ -22,14 +23,24 @@ def effects(b: Balance, term: Term, coefficients: Array | None = None) -> Effect
 
     `coefficients`: of the whole model, in place of those that were fitted.
     """
-    make = _MAKERS.get(term.law.name)
-    if make is None:
-        return {}
     c = b.corrected.coefficients if coefficients is None else coefficients
-    F_d = friction(b)
-    return (
-        {} if F_d <= 0.0 and make in _RELATIVE else make(term.law.values(c[b.model.part(term.law)]), F_d, b.plain.k_t)
-    )
+    return _of_law(b, term.law, c[b.model.part(term.law)])
+
+
+def instead(b: Balance, term: Term) -> Effects:
+    """The same of the laws that the balance cannot tell from this one."""
+    found: Effects = {}
+    for other in term.instead:
+        law = other.laws[-1]
+        found |= _of_law(b, law, other.coefficients[other.part(law)])
+    return found
+
+
+def _of_law(b: Balance, law: Law, own: Array) -> Effects:
+    make, F_d = _MAKERS.get(law.name), friction(b)
+    if make is None or (F_d <= 0.0 and make in _RELATIVE):
+        return {}
+    return make(law.values(own), F_d, b.plain.k_t)
 
 
 def friction(b: Balance) -> float:

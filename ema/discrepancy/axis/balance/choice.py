@@ -153,7 +153,8 @@ def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequenc
         share = _wins(law.name, model, rivals)
     alike = {name: wins for name, wins in share.items() if name != law.name and wins > SELDOM}
     common = float(np.mean([model.shared(law, r) for r in others])) if others else 0.0
-    return Term(law, (without.loss - model.loss) / max(int(found.whole.sum()), 1), share[law.name], alike, common)
+    power = (without.loss - model.loss) / max(int(found.whole.sum()), 1)
+    return Term(law, power, share[law.name], alike, common, tuple(rivals[name] for name in alike))
 
 
 def _wins(name: str, model: Regression, rivals: Mapping[str, Regression]) -> dict[str, float]:

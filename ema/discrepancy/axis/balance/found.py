@@ -20,6 +20,7 @@ class Term:
     `power` is the mean square [N² m² or N²] that held-out blocks lose by it, `alike` what does as well, by how often
     it wins over draws of blocks; `wins` how often this law does. `common` is the share that another law of the
     library has on average in common with this one, on these motions: so much of an unknown rest may be taken for it.
+    `instead` are fits with one of `alike` in its place, which is the last of their laws.
     """
 
     law: Law
@@ -27,6 +28,7 @@ class Term:
     wins: float
     alike: dict[str, float]
     common: float
+    instead: tuple[Regression, ...] = ()
 
 
 @dataclass(frozen=True)

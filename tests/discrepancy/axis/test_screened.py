@@ -1,0 +1,44 @@
+"""What the balance of torque shows is tried in free runs, and what it cannot tell from that too."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.screened import screened
+from ema.models.axis_config import RotaryAxis
+
+MOTOR, LOAD = "quadratic_load_friction", "quadratic_output_load_friction"
+
+
+@pytest.fixture(scope="module")
+def plant(support):
+    """Eight seconds, in which friction by the square of the motor's torque is not told from that by the load's too."""
+    geared = support("geared")
+    axis = geared.Axis(by_square=2.5)
+    found = AxisPlant(RotaryAxis.model_validate(geared.plant(axis)), [geared.record(axis, 1, seconds=8.0)], n_threads=1)
+    found.between = "held"
+    return found
+
+
+def tried(plant, balance, point=()):
+    return {c.key: c for c in screened(balance, plant.plant, dict(point))}
+
+
+def test_a_law_that_the_balance_cannot_tell_from_its_own_is_tried_too(plant):
+    (term,) = plant.balance.terms
+    assert {term.law.name, *term.alike} == {MOTOR, LOAD}
+    assert set(tried(plant, plant.balance)) == {MOTOR, LOAD}
+    sure = replace(plant.balance, terms=(replace(term, alike={}, instead=()),))
+    assert set(tried(plant, sure)) == {term.law.name}
+
+
+def test_it_is_begun_where_it_was_fitted_itself(plant):
+    (start,) = tried(plant, plant.balance)[MOTOR].starts
+    assert start[f"{MOTOR}.per_square"] * plant.plant.F_d == pytest.approx(2.5, rel=0.1)
+
+
+def test_what_a_model_has_is_not_tried_again(plant):
+    assert set(tried(plant, plant.balance, {f"{MOTOR}.per_square": 1.0})) == {LOAD}
