@@ -52,8 +52,11 @@ def beside_truth(t: strata_axis.Trial, said: dict[str, Any]) -> dict[str, Any]:
     quantities = {f"{e['name']}.{name}": q for e in reversed(effects) for name, q in e["parameters"].items()}
     true = {name: x for name, x in t.truth.items() if name in quantities and name in strata_axis.EXACT}
     sd = {name: (quantities[name]["high"] - quantities[name]["low"]) / 3.92 for name in true}
+    result = outcome(t, said)
+    hit = {name for e in effects for name in (e["name"], *e["indistinguishable_from"])}
+    missed = [strata_axis.nats(t, name) for name in t.effects if name not in hit] if result == "missed" else []
     return {
-        "outcome": outcome(t, said), "verdict": said["verdict"],
+        "outcome": result, "verdict": said["verdict"], "nats": max(missed, default=None),
         "named": [[e["name"], *e["indistinguishable_from"]] for e in effects],
         "confidence": [e["confidence"] for e in effects],
         "z": {name: (quantities[name]["value"] - x) / sd[name] for name, x in true.items() if sd[name] > 0.0},

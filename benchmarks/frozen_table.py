@@ -14,6 +14,7 @@ Row = Mapping[str, Any]
 CONFIDENT = 0.9
 EXPLAINED = 1.2  # held-out error over noise, beyond which nothing may be called explained
 QUIET = ("adequate", "explained")  # verdicts by which nothing more is said to be missing
+SEEN = 5.0  # nats, 150 to 1, that the truth must have on the same without an effect: with less no finder can name it
 VISIBLE = 1.2  # times what noise makes of the record; less cannot be missed
 INVENTED = 0.01  # a fault that is not there
 BINS = (0.0, 0.5, 0.8, 0.95, 1.0)
@@ -152,8 +153,10 @@ def _is_outside(row: Row) -> bool:
 
 
 def _is_unseen(row: Row) -> bool:
-    visible = row.get("visible")
-    return row["outcome"] == "missed" and row["verdict"] in QUIET and visible is not None and visible < VISIBLE
+    nats, visible = row.get("nats"), row.get("visible")  # of what is not named: the axis', the actuator's
+    if row["outcome"] != "missed" or nats is not None:
+        return nats is not None and nats < SEEN
+    return row["verdict"] in QUIET and visible is not None and visible < VISIBLE
 
 
 def _is_confidently_wrong(row: Row) -> bool:

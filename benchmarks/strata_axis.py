@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from random import Random
 from typing import Any
 
@@ -47,7 +47,8 @@ EXACT = {"cogging.amplitude", "asymmetric_friction.asymmetry", "constant_load.to
 class Trial:
     """Records with their plant file; `effects` are those hidden, of the library's, and `truth` their exact values.
 
-    `near`: effects of the library that act like what is hidden and is none of them.
+    `near`: effects of the library that act like what is hidden and is none of them. `without` makes the records again
+    without noise and without one of the effects, or with all (""); `noise` is each channel's rms.
     """
 
     case: str
@@ -57,6 +58,8 @@ class Trial:
     effects: tuple[str, ...]
     truth: dict[str, float]
     near: tuple[str, ...] = ()
+    without: Callable[[str], Record] | None = None
+    noise: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def told(self) -> dict[str, Any]:
@@ -70,30 +73,59 @@ class Trial:
         return self.case.split(",")[0]
 
 
+def nats(t: Trial, name: str) -> float:
+    """How much likelier records are with one effect than without it, all else known: more no finder can see of it.
+
+    Where nothing says how the records were made, each effect counts as seen.
+    """
+    if t.without is None:
+        return 1e9
+    total = 0.0
+    for c, other in zip(t.without("").cycles, t.without(name).cycles, strict=True):
+        for channel, rms in t.noise.items():
+            late = (c["t"] - other["t"]) * np.gradient(c[channel], c["t"])  # a clock that is off shows as that
+            total += 0.5 * float(np.sum(((c[channel] - other[channel] - late) / rms) ** 2))
+    return total
+
+
 def _bench(names: list[str], seed: int, plant: str) -> Trial:
     """A bench of `tests/support/axis_bench.py`, of another size, with effects in it."""
+    bench, rng, motions, file, truth = _sized(names, seed, plant)
+    record = axis_bench.record(bench, rng, motions=motions)
+
+    def without(name: str) -> Record:
+        bare, own, *_ = _sized(names, seed, plant, name)
+        bare.noise = dict.fromkeys(bare.noise, 0.0)
+        return axis_bench.record(bare, own, motions=motions)
+
+    library = tuple(name for name in names if name in hidden_axis.LIBRARY)
+    case = "+".join(names) or "nothing"
+    near = NEAR.get(case, ())
+    return Trial(case, plant, file, (record,), library, truth, near, without, dict(bench.noise))
+
+
+def _sized(names: list[str], seed: int, plant: str, but: str = "") -> tuple[Any, Any, Array, dict[str, Any], Any]:
+    """Bench, its random numbers, motions, plant file and truth; the effect `but` is drawn and not hidden."""
     torque, heavier, inductive, resistive = PLANTS[plant]
     bench, plant_file, motions = hidden_axis.drawn(seed)
     bench.J *= torque * heavier
-    for name in ("C", "F_d", "F_s", "k_t", "k_e", "V_dc"):
+    for name in ("C", "F_d", "F_s", "k_t", "k_e"):
         setattr(bench, name, getattr(bench, name) * torque)
     bench.R, bench.L = bench.R * resistive, bench.L * inductive
     noise = {**bench.noise, "u_q": bench.noise["u_q"] * max(torque, 1.0)}
     bench.noise = noise
-    told = {name: getattr(bench, name) for name in ("J", "C", "k_t", "k_e", "R", "L", "V_dc")}
+    told = {name: getattr(bench, name) for name in ("J", "C", "k_t", "k_e", "R", "L")}
+    told["V_dc"] = torque * bench.V_dc  # what is hidden in the voltage is drawn at the bench's own, and scaled below
     told |= {name: torque * plant_file[name] for name in ("F_d", "F_s")}
     told |= {"noise": dict(noise)} if "noise" in plant_file else {}
-    bench, drawn, rng = hidden_axis.bench_with(names, seed, bench)
+    bench, drawn, rng = hidden_axis.bench_with(names, seed, bench, but)
     opposing, voltage = bench.torque, bench.voltage
     bench.torque = lambda *at: torque * opposing(*at)
     bench.voltage = lambda u, i: torque * voltage(u / torque, i)
     truth = {
         f"{e}.{p}": float(x) * (torque if (e, p) in TORQUE else 1.0) for e, own in drawn.items() for p, x in own.items()
     }
-    record = axis_bench.record(bench, rng, motions=motions)
-    library = tuple(name for name in names if name in hidden_axis.LIBRARY)
-    case = "+".join(names) or "nothing"
-    return Trial(case, plant, {**plant_file, **told}, (record,), library, truth, NEAR.get(case, ()))
+    return bench, rng, motions, {**plant_file, **told}, truth
 
 
 def _nothing(number: int, seed: int, plant: str) -> Trial:

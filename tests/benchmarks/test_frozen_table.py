@@ -88,6 +88,12 @@ def test_what_is_missed_of_a_pair_is_judged_by_itself():
     assert cells(text, "hidden and not to be seen")[1] == "1 of 3"
 
 
+def test_what_the_truth_itself_could_not_show_is_not_missed_whatever_else_is_left():
+    missed = {"outcome": "missed", "verdict": "partly explained", "effects": ["cogging", "supply_sag"]}
+    text = frozen_table.table([row(), row(1, nats=3.0, **missed), row(2, nats=30.0, **missed)])
+    assert cells(text, "hidden and not to be seen")[1] == "1 of 3"
+
+
 def test_a_fault_that_is_not_there_and_an_explanation_that_leaves_much_are_counted():
     bad = row(1, k_after=[0.0, 0.0, 0.02, 0.0, 0.0, 0.0], err_after=0.013)
     text = frozen_table.table([row(), bad])

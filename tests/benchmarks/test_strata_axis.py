@@ -85,3 +85,19 @@ def test_the_same_seed_makes_the_same_trial():
     a, b = (strata_axis.drawn("two effects", 3, frozen.seed(HEAD, "two effects", 3)) for _ in range(2))
     assert (a.case, a.truth) == (b.case, b.truth)
     np.testing.assert_array_equal(a.records[0].cycles[0]["i_q"], b.records[0].cycles[0]["i_q"])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_on_every_plant_a_supply_sags_by_what_is_told_beside_a_drop_of_the_converter(seed, monkeypatch):
+    """By u² i R / U² to first order; one flaw of the voltage does not take the other's place."""
+    monkeypatch.setattr(strata_axis, "EFFECTS", ["supply_sag", "inverter_drop"])
+    t = strata_axis.drawn("two effects", 0, seed)
+    both, sag, drop = ({k: np.concatenate([c[k] for c in t.without(but)]) for k in ("i_q", "u_q")} for but in
+                       ("", "inverter_drop", "supply_sag"))  # fmt: skip
+    fell = t.truth["inverter_drop.voltage"] * np.tanh(drop["i_q"] / 0.02)
+    u = drop["u_q"] - fell
+    first = t.truth["supply_sag.resistance"] * u**2 * sag["i_q"] / t.plant_file["V_dc"] ** 2
+    assert (sag["u_q"] - u) @ first / (first @ first) == pytest.approx(1.0, abs=0.3)
+    assert (both["u_q"] - sag["u_q"]) @ fell / (fell @ fell) == pytest.approx(1.0, abs=0.3)
+    assert all(strata_axis.nats(t, name) > 5.0 for name in t.effects)
+    assert strata_axis.nats(t, "cogging") == 0.0

@@ -5,6 +5,8 @@ Functional forms differ from the library's wherever physics allows, so that find
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 from axis_bench import MOTIONS, PLANT, Bench
 
@@ -87,7 +89,8 @@ def winding_resistance(bench, rng):
 def inverter_drop(bench, rng):
     """Smooth sign."""
     v = rng.uniform(0.05, 0.3)
-    bench.voltage = lambda u, i: u + v * np.tanh(i / 0.02)
+    before = bench.voltage
+    bench.voltage = lambda u, i: before(u, i) + v * np.tanh(i / 0.02)
     return {"voltage": v}
 
 
@@ -129,13 +132,15 @@ def inertia(bench, rng):
 
 def drive_gain(bench, rng):
     g = rng.choice([-1.0, 1.0]) * rng.uniform(0.03, 0.1)
-    bench.measured_i = lambda i: i * (1.0 + g)
+    before = bench.measured_i
+    bench.measured_i = lambda i: before(i) * (1.0 + g)
     return {"gain": g}
 
 
 def drive_offset(bench, rng):
     d = _signed(rng, 0.03, 0.1)
-    bench.measured_i = lambda i: i + d
+    before = bench.measured_i
+    bench.measured_i = lambda i: before(i) + d
     return {"offset": d}
 
 
@@ -160,9 +165,10 @@ def gear_compliance(bench, rng):
 
 def supply_sag(bench, rng):
     """The command is raised for a bus that falls with the current it feeds: u (U / U_bus), U_bus by three rounds."""
-    R, U = rng.uniform(0.5, 2.0), bench.V_dc
+    R, U, before = rng.uniform(0.5, 2.0), bench.V_dc, bench.voltage
 
     def commanded(u, i):
+        u = before(u, i)
         bus = U
         for _ in range(3):
             bus = U - R * u * i / bus
@@ -260,8 +266,8 @@ def drawn(seed):
     return bench, plant, motions
 
 
-def bench_with(names, seed, bench=None):
-    """A bench with the named effects hidden in it, and their true parameters."""
+def bench_with(names, seed, bench=None, but=""):
+    """A bench with the named effects hidden in it, and their true parameters; `but` is drawn and not hidden."""
     rng = np.random.default_rng([seed, len(names)])
     bench = Bench() if bench is None else bench
     truth = {}
@@ -269,7 +275,7 @@ def bench_with(names, seed, bench=None):
     torques, frictions = [], []
     for name in names:
         before = (bench.torque, bench.friction)
-        truth[name] = everything[name](bench, rng)
+        truth[name] = everything[name](copy(bench) if name == but else bench, rng)
         if bench.torque is not before[0]:
             torques.append(bench.torque)
         if bench.friction is not before[1]:
