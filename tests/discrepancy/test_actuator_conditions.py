@@ -15,7 +15,7 @@ from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.examine import examine
 from ema.discrepancy.actuator.fit import excess_at
 from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
+from ema.discrepancy.actuator.plant import CARRIED, EmaPlant
 from ema.discrepancy.actuator.play import pressed
 from ema.discrepancy.actuator.zeros import zero_apart
 from ema.discrepancy.extended import write_extended
@@ -227,6 +227,19 @@ def test_late_comparators_that_went_on_switching_at_rest_do_so_in_the_simulation
     truth = {"comparator_delay.time": 2.91e-6, "k5": 0.0225, "k6": 0.0209}
     plant = EmaPlant(as_recorded(shipped_plant, data.signals)[0], data)
     assert excess_at(plant, Noise(plant, truth), truth, [1]) < 1.0
+
+
+def test_what_sensors_show_too_much_is_no_current_that_comparators_switch_at_rest(hidden, shipped_plant):
+    """Late comparators had been begun as switching where offsets alone were recorded: a misfit that was no cause's."""
+    (cycle,) = hidden.cycles(hidden.Flaws(recorder_offset_a=0.1, offset_c=0.12), 1, 3)
+    data = measured(shipped_plant, [Record((Cycle(0, cycle), Cycle(1, cycle)))])
+    plant = EmaPlant(shipped_plant, data)
+    assert np.abs(data.holding).max() > CARRIED
+    shown = {"recorder_offset.offset_a": 0.1, "current_offset.offset_c": 0.12, "comparator_delay.time": 2e-6}
+    for point, is_switching in ((shown, False), ({"comparator_delay.time": 2e-6}, True)):
+        holding = plant.holding([point], np.array([0]))
+        assert (np.abs(holding).max() > CARRIED) == is_switching
+        assert (plant.legs([point], holding) < 0.0).any() == is_switching
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator import features as f
-from ema.discrepancy.actuator.controller import gains
+from ema.discrepancy.actuator.controller import gains, of_error, said_of_error
 from ema.discrepancy.actuator.cycles import measured
 from ema.discrepancy.actuator.fit import residuals
 from ema.discrepancy.actuator.gear import resonance
@@ -152,3 +154,48 @@ def test_other_gains_of_the_controller_are_read_from_the_record(hidden, shipped_
 @pytest.mark.parametrize("flaws", [{}, {"viscous": 1e-4}, {"k3": 0.3}, {"position_delay": 1e-3}, {"reaction": 3e-6}])
 def test_what_is_no_controller_is_not_taken_for_other_gains(hidden, shipped_plant, flaws):
     assert gains(shipped_plant, prepared(shipped_plant, hidden.cycles(hidden.Flaws(**flaws), 2, 4)).signals) is None
+
+
+def rests_of_control(plant, hidden, flaws):
+    """What the actuator without flaws, of other switching instants, leaves of the currents of one with them."""
+    made, sound = (
+        prepared(plant, hidden.cycles(hidden.Flaws(**has), 2, seed)).signals for has, seed in ((flaws, 4), ({}, 9))
+    )
+    return [
+        (a, (f.features(plant, a)["control"] - f.features(plant, b)["control"])[0])
+        for a, b in zip(made, sound, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("deadband", [1e-4, 2e-4])
+def test_a_controller_that_ignores_small_errors_is_told_by_the_error_it_ignores(hidden, shipped_plant, deadband):
+    found = of_error(shipped_plant, rests_of_control(shipped_plant, hidden, {"deadband": deadband}))
+    assert found is not None
+    (sentence,) = said_of_error(found)
+    told = re.search(r"as if errors below (\S+) rad were ignored", sentence)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(deadband, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "flaws", [{}, {"viscous": 1e-4}, {"position_delay": 1e-3}, {"speed_gain": -0.2}, {"k3": 0.3}, {"gain_a": 0.05}]
+)
+def test_what_is_no_law_of_the_error_is_not_taken_for_one(hidden, shipped_plant, flaws):
+    assert of_error(shipped_plant, rests_of_control(shipped_plant, hidden, flaws)) is None
+
+
+@pytest.mark.parametrize(
+    ("current", "told"),
+    [
+        (lambda e: 3e3 * (np.clip(e, -1e-3, 1e-3) - e), "as if errors were cut off at 0.001 rad"),
+        (lambda e: -3e3 * np.clip(e, -1e-3, 1e-3), "as if errors below 0.001 rad were ignored"),
+        (lambda e: -3e3 * np.clip(e, -3e-5, 3e-5), "as if errors below 3e-05 rad were ignored"),
+        (lambda e: 2e3 * np.abs(e), None),
+        (lambda e: np.sin(4e3 * e), None),
+    ],
+)
+def test_a_law_of_the_error_is_told_in_words_where_one_number_makes_it(current, told):
+    at = np.linspace(-4e-3, 4e-3, 24)
+    (said,) = said_of_error({"at": at.tolist(), "current": current(at).tolist(), "share": 0.9, "gain": 3e3})
+    assert ("as if" in said) == (told is not None)
+    assert told is None or told in said

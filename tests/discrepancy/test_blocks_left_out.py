@@ -29,3 +29,22 @@ def test_samples_that_hang_together_within_a_block_count_once():
 
 def test_of_one_block_nothing_is_told():
     assert covariance(np.eye(2), [(np.eye(2), np.ones(2))]) == pytest.approx(np.zeros((2, 2)))
+
+
+def test_it_is_what_refits_without_each_block_scatter_by_about_their_own_mean():
+    """Blocks of unequal length and of unequal size: the refits' mean is then another than the fit of all."""
+    rng = np.random.default_rng(3)
+    sizes = (40, 7, 3, 25)
+    rows = [(rng.standard_normal((n, 2)) * (1.0, n), rng.standard_normal(n) * n) for n in sizes]
+    A, y = np.concatenate([x for x, _ in rows]), np.concatenate([z for _, z in rows])
+    whole = np.linalg.lstsq(A, y, rcond=None)[0]
+    refits = []
+    for k in range(len(rows)):
+        others = [own for j, own in enumerate(rows) if j != k]
+        refits.append(np.linalg.lstsq(*(np.concatenate(x) for x in zip(*others, strict=True)), rcond=None)[0])
+    wanted = np.cov(np.array(refits).T) * (len(rows) - 1) ** 2 / len(rows)
+    blocks = [(a.T @ a, a.T @ (z - a @ whole)) for a, z in rows]
+    assert covariance(A.T @ A, blocks) == pytest.approx(wanted, rel=1e-6)
+    about_the_whole = np.array(refits) - whole
+    other = about_the_whole.T @ about_the_whole * (len(rows) - 1) / len(rows)
+    assert np.abs(other / wanted - 1.0).max() > 0.02  # the test sees which mean it is

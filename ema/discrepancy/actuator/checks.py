@@ -14,6 +14,7 @@ from .features import Signals, motor_torque, reference, reference_terms
 
 MAX_LAG = 6e-3  # [s] no sensor or loop of this plant is that late; channels are apart
 MAX_CLIPPED = 0.1  # share of samples at the largest value
+APART = 2.0  # times what channels leave of each other where they agree best, that they leave at a credible lag
 FOLLOWING = 0.5  # correlation of channels that belong together, at least
 
 
@@ -71,7 +72,7 @@ def _check_synchrony(where: str, s: Signals, plant: Actuator) -> None:
     slow = ", or the current control is far slower than the plant file's"
     pairs = (
         ("the currents", "position and command", _lag_of_loop(plant, s, reach), slow),
-        ("θ_u", "θ_m", _lag(s.theta_u[0], s.theta_m[0], reach), ""),
+        ("θ_u", "θ_m", _lag(s.theta_u[0], s.theta_m[0], reach, MAX_LAG * rate), ""),
     )
     for late, early, (lag, correlation), or_else in pairs:
         if abs(lag) > MAX_LAG * rate:
@@ -92,27 +93,28 @@ def _lag_of_loop(plant: Actuator, s: Signals, reach: int) -> tuple[int, float]:
     Where these do not agree the controller may have other gains, which turn the phase of what it asks for: then that is
     the sum of its two terms with whatever positive gains fit best.
     """
-    tau = motor_torque(plant, s)[0][0]
-    lag, correlation = _lag(tau, reference(plant, s)[0], reach)
-    if abs(lag) <= MAX_LAG * plant.control.rate and correlation >= FOLLOWING:
+    tau, credible = motor_torque(plant, s)[0][0], MAX_LAG * plant.control.rate
+    lag, correlation = _lag(tau, reference(plant, s)[0], reach, credible)
+    if abs(lag) <= credible and correlation >= FOLLOWING:
         return lag, correlation
     terms = reference_terms(plant, s)[:, 0]
-    other = _lag(tau, (terms / terms.std(axis=1, keepdims=True)).T, reach)
+    other = _lag(tau, (terms / terms.std(axis=1, keepdims=True)).T, reach, credible)
     return max((lag, correlation), other, key=lambda found: found[1])
 
 
-def _lag(x: Array, y: Array, reach: int) -> tuple[int, float]:
+def _lag(x: Array, y: Array, reach: int, credible: float) -> tuple[int, float]:
     """Samples by which `x` is later than `y` where they agree best, and their correlation there.
 
-    Of several `y`, shape (n_times, n), the sum with positive weights that fits best is taken.
+    A credible lag is taken where they agree hardly worse: slow motion says little about lags. Of several `y`, shape
+    (n_times, n), the sum with positive weights that fits best is taken.
     """
-    best = (0, -1.0)
+    best, near = (0, -1.0), (0, -1.0)
     for lag in range(-reach, reach + 1, 5):
         a, b = _shifted(x, y, lag)
         r = _correlation(a - a.mean(), b - b.mean(axis=0))
-        if r > best[1] + 1e-6:
-            best = (lag, r)
-    return best
+        best = (lag, r) if r > best[1] + 1e-6 else best
+        near = (lag, r) if r > near[1] + 1e-6 and abs(lag) <= credible else near
+    return near if near[1] >= FOLLOWING and 1.0 - near[1] ** 2 < APART * (1.0 - best[1] ** 2) else best
 
 
 def _correlation(x: Array, y: Array) -> float:

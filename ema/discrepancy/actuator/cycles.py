@@ -17,6 +17,7 @@ from ema.models.turns import nearest_turn
 from .checks import check_rate, check_signals
 from .features import Signals, features, stacked
 from .measured import Measured
+from .resolution import resolution
 from .sampling import between, positions_every
 from .zeros import zero_apart
 
@@ -30,8 +31,6 @@ AT_REST = 1e-3  # [s] at the start of a cycle, over which the position is averag
 CLEAR = 4.0  # standard deviations
 STARTING = (10e-3, 7e-3, 5e-3, 3.5e-3, 2.5e-3)  # [s] at the start of a cycle
 SAME_COMMAND, LOCAL = 1e-6, 5e-3  # [rad] by which commands of one motion may differ in the mean over [s]
-COUNTED = (4.0, 100.0, np.inf)  # steps between values that a rough, a better and a good step tell apart
-OFF_GRID = 0.2  # of a step, by which few decimals may put values beside it
 AS_NOISE = 1.15  # times the noise that a curve through it may leave
 
 
@@ -57,8 +56,8 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
             everything.append((s, cycle))
     signals = [s for s, _ in everything]
     every = positions_every(signals[0].theta_m[0])
-    motion = [_motion(commands, c["theta_cmd"], _step(c["theta_cmd"][::every]), plant) for _, c in everything]
-    commands = [between(c, every, _step(c[::every])) for c in commands]
+    motion = [_motion(commands, c["theta_cmd"], resolution(c["theta_cmd"][::every]), plant) for _, c in everything]
+    commands = [between(c, every, resolution(c[::every])) for c in commands]
     rest = max(1, round(AT_REST * plant.control.rate))
     user = np.array([_user_at_start(s.theta_u[0], plant.control.rate) for s in signals])
     start = np.column_stack([user[:, 0], [s.theta_m[0, 0] for s in signals]])
@@ -78,7 +77,7 @@ def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
         holding - holding.mean(axis=1, keepdims=True),
         dT,
         with_temperature,
-        _step(np.concatenate([cycle["theta_m"][::every] for _, cycle in everything])),
+        resolution(np.concatenate([cycle["theta_m"][::every] for _, cycle in everything])),
         _white_noise([s.theta_m[0] for s in signals]) if every == 1 else 0.0,
         zero_apart(plant, signals),
         every,
@@ -98,13 +97,13 @@ def _signals(cycle: Cycle, with_supply: bool, GR: float) -> Signals:
     )
 
 
-def _motion(commands: list[Array], command: Array, resolution: float, plant: Actuator) -> int:
+def _motion(commands: list[Array], command: Array, step: float, plant: Actuator) -> int:
     """Index of the motion with this command, but for noise or the resolution it is recorded with; appended if new."""
     width = max(1, round(LOCAL * plant.control.rate))
     for index, known in enumerate(commands):
         if len(known) != len(command) or np.abs(known - command).max() > plant.sensors.lvdt_step:
             continue
-        if np.abs(uniform_filter1d(known - command, width)).max() <= max(resolution, SAME_COMMAND):
+        if np.abs(uniform_filter1d(known - command, width)).max() <= max(step, SAME_COMMAND):
             return index
     commands.append(command)
     return len(commands) - 1
@@ -115,7 +114,7 @@ def _speed_at_start(theta_m: Array, rate: float) -> float:
 
     From rest the second difference is at least three times the first; what moves already has two alike.
     """
-    step = _step(theta_m) or 4.0 * _white_noise([theta_m])
+    step = resolution(theta_m) or 4.0 * _white_noise([theta_m])
     m = START_SAMPLES if step else 1
     first, second = float(theta_m[m] - theta_m[0]), float(theta_m[2 * m] - theta_m[m])
     w = (3.0 * first - second) * rate / (2.0 * m)
@@ -143,26 +142,10 @@ def _user_at_start(theta_u: Array, rate: float) -> tuple[float, float]:
     return (theta, w) if is_moving else (float(x[: max(1, round(AT_REST * rate))].mean()), 0.0)
 
 
-def _step(x: Array) -> float:
-    """Resolution of a channel: the distance of the grid on which its values lie, as few decimals round them, else 0."""
-    values = np.unique(np.round(x, 10))  # interpolation leaves rounding
-    if len(values) < 3:
-        return 0.0
-    gaps = np.diff(values)
-    step = float(gaps.min())
-    if step < 1e-6:
-        return 0.0
-    for reach in COUNTED:  # few decimals make the least gap too small, the more so the wider ones
-        narrow = gaps[gaps < reach * step]
-        step = float(narrow.sum() / np.round(narrow / step).sum())
-    off = gaps / step
-    return step if np.abs(off - np.round(off)).max() < OFF_GRID else 0.0
-
-
 def _white_noise(channels: Sequence[Array]) -> float:
     """Rms of what is white in an angle, from fourth differences by their median; 0 where it is less than HIDDEN."""
     differences = np.concatenate([np.diff(x, 4) for x in channels])
     rms = float(np.median(np.abs(differences))) / MEDIAN_OF_NORMAL / np.sqrt(70.0)  # 70 = 1² + 4² + 6² + 4² + 1²
-    step = _step(np.concatenate(list(channels)))
+    step = resolution(np.concatenate(list(channels)))
     white = np.sqrt(max(rms**2 - step**2 / 12.0, 0.0))
     return float(white) if white > max(HIDDEN, step) else 0.0

@@ -46,7 +46,7 @@ GROUPS = {
     "gap": (5e-3, 3.0e-7, "rad"),
     "sum": (25e-3, 3.0e-4, "A"),
     "phase": (0.0, 2.0e-3, "A"),
-    "supply": (10e-3, 0.02, "V"),
+    "supply": (10e-3, 0.02, "V"),  # where no repetition tells (`supply.py`)
 }
 
 _trap = vectorize(nopython=True, cache=True)(lambda x: trap(x))

@@ -24,6 +24,7 @@ from .gear import Resonance
 from .measured import Measured
 from .runs import Asked, Memory, Runs, Work
 from .sampling import straightened
+from .supply import resolved
 
 Steps = tuple[float, ...] | None  # None: the plant's
 STEPS = (1e-6, 8e-7)  # [s] integration steps of a mean
@@ -60,6 +61,11 @@ class EmaPlant:
         groups = [features(plant, data.signals[c]) for c in self.first]
         self.slices = [slices(g) for g in groups]
         self.floors = [floors(g) for g in groups]
+        supply = [at["supply"] for at in self.slices if "supply" in at]
+        trusted = resolved(data, supply) if supply else None
+        if trusted is not None:
+            for floor, of in zip(self.floors, supply, strict=True):
+                floor[of] = trusted
 
     def neutral(self, name: str) -> float:
         """Value of a parameter that a point does not name: the plant file's own, or neutral."""
@@ -126,11 +132,12 @@ class EmaPlant:
         start = hf.start_at(self.plant, d.start[cycles_, 0] + zero + unseen, theta_m)
         start[:, STATE.index("w_m")] = d.speed[cycles_]
         start[:, STATE.index("w_u")] = d.user_speed[cycles_]
-        legs = self._legs(points, cycles_)
+        holding = self.holding(points, cycles_)
+        legs = self.legs(points, holding)
         for j, phase in enumerate(PHASES):  # the current that held it before
             start[:, STATE.index(f"s_{phase}")] = legs[:, j]
             for name in ("i", "lag1", "lag2"):
-                start[:, STATE.index(f"{name}_{phase}")] = d.holding[cycles_, j]
+                start[:, STATE.index(f"{name}_{phase}")] = holding[:, j]
         r = hf.simulate(
             self.plant,
             k,
@@ -207,13 +214,21 @@ class EmaPlant:
                 given.setdefault(parameter, np.full(len(points), value))
         return effects
 
-    def _legs(self, points: Sequence[Point], cycles: np.ndarray) -> Array:
-        """State of the three legs at the start, shape (n, 3).
+    def holding(self, points: Sequence[Point], cycles: np.ndarray) -> Array:
+        """Phase currents at the start, shape (n, 3): those of the record less what sensors show too much. [A]"""
+        shown = np.zeros((len(points), len(PHASES)))
+        for effect in ("current_offset", "recorder_offset"):
+            names = [f"{effect}.offset_{phase}" for phase in PHASES]
+            shown += np.array([[point.get(name, self.neutral(name)) for name in names] for point in points])
+        return np.asarray(self.data.holding[cycles] - shown + shown.mean(axis=1, keepdims=True))
+
+    def legs(self, points: Sequence[Point], holding: Array) -> Array:
+        """State of the three legs at the start, shape (n, 3), with the currents there.
 
         Within the comparators' band a motor at rest is without current, all legs alike, unless comparators that answer
         late go on switching as they had begun: then it carries what the controller asks for, and the record shows it.
         """
-        name, holding = "comparator_delay.time", self.data.holding[cycles]
+        name = "comparator_delay.time"
         late = np.array([p.get(name, self.neutral(name)) for p in points]) > 0.0
         switching = late & (np.abs(holding).max(axis=1) > CARRIED)
         return np.where(switching[:, None] & (holding < 0.0), -1.0, 1.0)

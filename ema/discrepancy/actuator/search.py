@@ -97,18 +97,19 @@ class Search:
         ]
         return float(np.mean([mine - others for mine, others in misfits]))
 
-    def torques(self, model: Model) -> list[Torque]:
-        """What `model` leaves of the torque balance, by training cycle. [N m]"""
-        plant = self.plant
-        found = []
+    def rests(self, model: Model, group: str) -> list[tuple[int, Array, Array]]:
+        """Training cycles with what `model` leaves of a balance, and its noise, at the nodes."""
+        plant, found = self.plant, []
         means = plant.means([model.fit.point], self.train, plant.n_seeds(self.train, N_SEEDS), SEED)[0]
         for c in self.train:
-            motion = int(plant.data.motion[c])
-            at = plant.slices[motion]["torque"]
-            r = plant.data.y[c] - means[c]
-            sd = self.noise.of(c).sd
-            found.append(torque(plant.data.signals[c], r[at], sd[at], plant.plant.control.rate))
+            at = plant.slices[int(plant.data.motion[c])][group]
+            found.append((c, (plant.data.y[c] - means[c])[at], self.noise.of(c).sd[at]))
         return found
+
+    def torques(self, model: Model) -> list[Torque]:
+        """What `model` leaves of the torque balance, by training cycle. [N m]"""
+        signals, rate = self.plant.data.signals, self.plant.plant.control.rate
+        return [torque(signals[c], r, sd, rate) for c, r, sd in self.rests(model, "torque")]
 
     def owed_to(self, model: Model, effect: Candidate, *, in_training: bool = False) -> float:
         """How much misfit comes back, held-out or in training, when an effect is switched off and all else stays."""

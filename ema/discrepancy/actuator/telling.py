@@ -62,7 +62,12 @@ def told(
     if odd or not v.is_noise:
         base = Model((), before.fit, before.heldout) if odd or too_little else after  # beside what is named
         shape = structure(search.torques(base), search.plant.plant.control.rate, v.scores)
-        shape["sentences"] += controller.said(search.plant.plant, search.plant.data.signals)
+        signals = search.plant.data.signals
+        shape["sentences"] += controller.said(search.plant.plant, signals)
+        rests = [(signals[c], r) for c, r, _ in search.rests(base, "control")]
+        if of_error := controller.of_error(search.plant.plant, rests):
+            shape["controller"] = of_error
+            shape["sentences"] += controller.said_of_error(of_error)
         shape["sentences"] += repeating.said(repeating.repeating(search, base.fit.point))
     if made.is_little and not made.left.is_chance:
         notes.append(f"{made.left.sentence} (p = {v.p_value:.1g})")
@@ -160,6 +165,8 @@ def _left_in_training(before: Model, after: Model) -> float:
 
 def with_function(search: Search, findings: Findings, before: Model, after: Model) -> tuple[Findings, Model]:
     """What the structure says as a function, simulated: part of the extended plant if held-out cycles gain by it."""
+    if "controller" in findings.structure:
+        return findings, after  # a torque would stand in for it
     base = Model((), before.fit, before.heldout)
     for effect, values in as_extension(findings.structure).items():
         table = {f"{effect}.{name}": value for name, value in values.items()}

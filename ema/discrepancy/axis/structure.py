@@ -15,7 +15,7 @@ import numpy as np
 from ema.core.records import Array
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects.search import AxisSizes
-from ema.effects.torque_term import COLUMNS, EVEN, NEUTRAL
+from ema.effects.torque_term import COLUMNS, EVEN, NEUTRAL, power
 
 from .sizes import sizes
 from .weak_form import FEWEST, Motion, Weak, thinned, weak_form
@@ -32,7 +32,10 @@ MIN_GAIN = 0.01  # of the weak-form residual's power
 
 @dataclass(frozen=True)
 class Term:
-    """A member of a family of terms: its columns over the motion and the values of `torque_term` it stands for."""
+    """A member of a family of terms: its columns over the motion and the values of `torque_term` it stands for.
+
+    The columns are without the current, which multiplies what their test functions see of them.
+    """
 
     family: str
     columns: tuple[Array, ...]
@@ -47,13 +50,14 @@ def search(plant: Measured, point: Point, blocks: Sequence[int]) -> list[Candida
         return []
     m = weak.motion
     q, rest = weak.beside()
+    needed = _needed(plant, weak)
     best: dict[str, tuple[float, Term, Array]] = {}
     for family, terms in _families(m, sizes(plant), _own_frequency(plant)).items():
-        for gain, term, coefficients in _gains(weak, terms, q, rest):
+        for gain, term, coefficients in _gains(weak, terms, needed, q, rest):
             if gain > best.get(family, (0.0,))[0]:
                 best[family] = (gain, term, coefficients)
-    power = float(rest @ rest)
-    ranked = sorted((b for b in best.values() if b[0] > MIN_GAIN * power), key=lambda b: -b[0])
+    least = MIN_GAIN * float(rest @ rest)
+    ranked = sorted((b for b in best.values() if b[0] > least), key=lambda b: -b[0])
     number = 1 + len({name.split(".")[0] for name in point if name.startswith("term")})
     return [_candidate(f"term{number}", term, c, plant) for _, term, c in ranked[:N_SUGGESTIONS]]
 
@@ -65,10 +69,23 @@ def _families(m: Motion, s: AxisSizes, own: float) -> dict[str, list[Term]]:
     return out
 
 
-def _gains(weak: Weak, terms: Sequence[Term], q: Array, rest: Array) -> Iterator[tuple[float, Term, Array]]:
+def _needed(plant: Measured, weak: Weak) -> Array:
+    """Current (or force) that the model needs over each test function, (n_y,).
+
+    What is recorded holds the torque that is looked for: the residual would be a function of itself.
+    """
+    k_t = 1.0 if plant.plant.is_force else float(plant.plant.k_t or 1.0)
+    return np.asarray(weak.integrate(weak.motion.i) - weak.y / k_t)
+
+
+def _gains(
+    weak: Weak, terms: Sequence[Term], needed: Array, q: Array, rest: Array
+) -> Iterator[tuple[float, Term, Array]]:
     """Power of the residual that each term of a family explains beside `q`, and its coefficients."""
     parts = [np.stack(columns, axis=1) for columns in zip(*(t.columns for t in terms), strict=True)]
-    own = [weak.integrate(part) / weak.sigma[:, None] for part in parts]
+    exponent = terms[0].values.get("current_power", 0.0)
+    factor = np.array([power(i, exponent) for i in needed]) / weak.sigma
+    own = [weak.integrate(part) * factor[:, None] for part in parts]
     left = [part - q @ (q.T @ part) for part in own]
     left = [np.where(_norms(b) < 1e-3 * _norms(a), 0.0, b) for a, b in zip(own, left, strict=True)]
     for k, term in enumerate(terms):
@@ -88,11 +105,11 @@ def _dictionary(m: Motion, s: AxisSizes, own: float) -> Iterator[Term]:
     duration = float(np.ptp(m.t))
     simple: tuple[tuple[str, Array, dict[str, float]], ...] = (
         ("quadratic in speed", m.w * np.abs(m.w), {"speed_power": 2.0}),
-        ("proportional to current", m.i, {"current_power": 1.0}),
-        ("quadratic in current", m.i * np.abs(m.i), {"current_power": 2.0}),
-        ("even in current", np.abs(m.i), {"current_power": EVEN}),
+        ("proportional to current", one, {"current_power": 1.0}),
+        ("quadratic in current", one, {"current_power": 2.0}),
+        ("even in current", one, {"current_power": EVEN}),
         ("even in speed", np.abs(m.w), {"speed_power": EVEN}),
-        ("speed times current", m.w * m.i, {"speed_power": 1.0, "current_power": 1.0}),
+        ("speed times current", m.w, {"speed_power": 1.0, "current_power": 1.0}),
     )
     for family, f, values in simple:
         yield Term(family, (f,), values, {})
@@ -101,7 +118,7 @@ def _dictionary(m: Motion, s: AxisSizes, own: float) -> Iterator[Term]:
         lines: tuple[tuple[str, Array, dict[str, float]], ...] = (
             ("angle line", one, {}),
             ("angle line of friction", sign, {"is_friction": 1.0}),
-            ("angle line times current", m.i, {"current_power": 1.0}),
+            ("angle line times current", one, {"current_power": 1.0}),
         )
         for family, factor, values in lines:
             for n in np.linspace(resolution, min(resolution * N_GRID / 2, 260.0), N_GRID):

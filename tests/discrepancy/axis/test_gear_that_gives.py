@@ -1,0 +1,58 @@
+"""A load behind a spring: from where a fit of its resonance begins. The motion of the load is written down."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import on_paper
+import pytest
+
+from ema.core.records import Cycle
+from ema.discrepancy.axis.gear import DAMPING, gear_candidate
+from ema.models.axis_config import RotaryAxis
+
+SHARE, RESONANCE = 0.5, 11.0  # of the inertia, behind the gear; [Hz] of the load against a motor that is held
+PARTS = ((1.5, 2.3, 0.3), (0.05, 31.0, 1.1), (0.02, 57.0, 0.4), (0.008, 83.0, 2.0))
+AT = {"F_d": on_paper.F_D}
+
+
+@pytest.fixture(scope="module")
+def resonating():
+    """J_l a_l = Δ/c + 2 ζ √(J_l/c) dΔ/dt of each sine of the load; the motor is ahead of it by Δ."""
+    rng = np.random.default_rng(1)
+    t = np.arange(0.0, 4.0, 1e-3)
+    J_l = SHARE * on_paper.J
+    k = (2.0 * np.pi * RESONANCE) ** 2 * J_l
+    theta, w, a, inner = (np.zeros(len(t)) for _ in range(4))
+    for A, f, phase in PARTS:
+        load = A * np.exp(1j * (f * t + phase))
+        motor = load - J_l * f**2 * load / (k + 2j * DAMPING * np.sqrt(J_l * k) * f)
+        theta, w, a = theta + motor.imag, w + (1j * f * motor).imag, a - (f**2 * motor).imag
+        inner = inner - J_l * (f**2 * load).imag
+    tau = (on_paper.J - J_l) * a + inner + on_paper.C * w + on_paper.F_D * np.sign(w)
+    true = {"theta_m": theta, "w_m": w, "i_q": tau / on_paper.K_T}
+    noisy = {name: x + on_paper.NOISE[name] * rng.standard_normal(len(t)) for name, x in true.items()}
+    return on_paper.plant(Cycle(0, {"t": t, **noisy}))
+
+
+def test_the_resonance_is_looked_for_where_it_is(resonating):
+    found = gear_candidate(resonating, AT, on_paper.everywhere(resonating))
+    (start,) = found.starts
+    c, J_l = start["gear_compliance.compliance"], start["gear_compliance.inertia"]
+    assert 1.0 / (2.0 * np.pi * np.sqrt(c * J_l)) == pytest.approx(RESONANCE, rel=0.25)
+    assert all(f.low < start[f.name] < f.high for f in found.free)
+    without, there = (resonating.residuals([point], on_paper.everywhere(resonating))[0] for point in (AT, AT | start))
+    assert sum(float((r**2).sum()) for r in there) < 0.5 * sum(float((r**2).sum()) for r in without)
+
+
+def test_where_it_may_not_be_it_is_not_looked_for(resonating):
+    every = on_paper.everywhere(resonating)
+    assert gear_candidate(resonating, AT | {"gear_compliance.compliance": 1.0}, every) is None
+    at_rest = SimpleNamespace(windows=[SimpleNamespace(static=True)])
+    assert gear_candidate(at_rest, AT, [0]) is None
+    by_itself = RotaryAxis.model_validate(
+        {"drive": "speed-loop", "J": 1e-4, "F_d": 0.01, "k_t": 0.05, "loop": {"K_w": 1.0}}
+    )
+    looped = SimpleNamespace(windows=[SimpleNamespace(static=False)], plant=by_itself)
+    assert gear_candidate(looped, AT, [0]) is None

@@ -1,0 +1,166 @@
+"""What noise makes of a free run: white after whitening, its variance as foretold, and a start state taken off."""
+
+from __future__ import annotations
+
+import numpy as np
+import on_paper
+import pytest
+
+from ema.discrepancy.axis.noise_model import noise_model, position_noise, without_start
+from ema.discrepancy.axis.pack import MEMORY, Pack
+from ema.discrepancy.axis.whitening import design, joined, open_loop_variance
+
+H = np.array([[1.0, 0.0], [0.0, 1.0]])  # angle and speed
+DAMPING, N = 200.0, 3000
+NOISE, PUSH = (5e-6, 0.05), 20.0  # rms of the outputs, and of the acceleration by the drive's noise
+
+
+def deviating(seed, n=N, start=(0.0, 0.0)):
+    """A free run's deviation under noise, simulated: time, residual (2, n)."""
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.uniform(0.5e-3, 1.5e-3, n))
+    state, out = np.array(start), np.empty((2, n))
+    for k, h in enumerate(np.append(np.diff(t), 0.0)):
+        out[:, k] = state + NOISE * rng.standard_normal(2)
+        fade, push = np.exp(-DAMPING * h), PUSH * rng.standard_normal()
+        state = np.array([state[0] + (1.0 - fade) / DAMPING * state[1] + 0.5 * push * h**2, fade * state[1] + push * h])
+    return t, out
+
+
+def filter_for(t, start=(0.1, 10.0)):
+    noise = np.outer(NOISE, np.ones(len(t)))
+    return design(H, noise, np.full(len(t), PUSH), t, start, DAMPING)
+
+
+@pytest.fixture(scope="module")
+def quiet():
+    return on_paper.plant(on_paper.cycle())
+
+
+@pytest.fixture(scope="module")
+def rippled():
+    return on_paper.plant(on_paper.cycle(lambda t, theta, w: 2e-3 * np.sin(12 * theta)))
+
+
+@pytest.mark.parametrize("start", [(0.0, 0.0), (7e-3, -0.6)])
+def test_innovations_are_white_and_of_size_one_wherever_it_starts(start):
+    t, residual = deviating(1, start=start)
+    white = filter_for(t).whiten(residual)
+    assert np.mean(white**2, axis=1) == pytest.approx([1.0, 1.0], abs=0.1)
+    for row in white:
+        assert abs(np.mean(row[1:] * row[:-1])) < 4.0 / np.sqrt(N)
+    assert abs(np.mean(white[0] * white[1])) < 4.0 / np.sqrt(N)
+    raw = residual[0] / residual[0].std()
+    assert np.mean(raw[1:] * raw[:-1]) > 0.9  # it was not white before
+
+
+def test_what_a_missing_torque_makes_is_no_innovation():
+    t, residual = deviating(1)
+    pushed = residual + np.stack([0.2 * (t - t[0]), np.full(N, 0.2)])
+    assert np.mean(filter_for(t).whiten(pushed) ** 2) > 1.5
+
+
+def test_windows_whitened_together_are_as_each_alone():
+    runs = [deviating(seed, 200, (0.3, 2.0)) for seed in (1, 2)]
+    alone = [filter_for(t).whiten(residual) for t, residual in runs]
+    together = joined([filter_for(t) for t, _ in runs]).whiten(np.concatenate([r for _, r in runs], axis=1))
+    assert together == pytest.approx(np.concatenate(alone, axis=1))
+
+
+def test_the_variance_of_free_runs_is_foretold():
+    n, start = 60, (1e-5, 0.3)
+    t, _ = deviating(0, n)
+    rng, ends = np.random.default_rng(5), []
+    for _ in range(3000):
+        state = start * rng.standard_normal(2)
+        for h in np.diff(t):
+            fade, push = np.exp(-DAMPING * h), PUSH * rng.standard_normal()
+            state = np.array(
+                [state[0] + (1.0 - fade) / DAMPING * state[1] + 0.5 * push * h**2, fade * state[1] + push * h]
+            )
+        ends.append(state + NOISE * rng.standard_normal(2))
+    out = np.empty((2, n))
+    noise = np.outer(NOISE, np.ones(n))
+    covariance = np.array([start[0] ** 2, 0.0, start[1] ** 2])
+    open_loop_variance(H, noise, np.full(n, PUSH), np.append(np.diff(t), 0.0), covariance, DAMPING, out)
+    assert np.var(ends, axis=0) == pytest.approx(out[:, -1], rel=0.1)
+
+
+def test_of_the_right_model_a_record_leaves_white_noise_of_size_one(quiet, rippled):
+    (right,) = quiet.residuals([{"F_d": on_paper.F_D}], on_paper.everywhere(quiet))
+    every = np.concatenate(right, axis=1)
+    assert np.mean(every**2) == pytest.approx(1.0, abs=0.15)
+    assert abs(np.mean(every[:, 1:] * every[:, :-1])) < 0.1
+    (wrong,) = rippled.residuals([{"F_d": on_paper.F_D}], on_paper.everywhere(rippled))
+    assert np.mean(np.concatenate(wrong, axis=1) ** 2) > 1.5
+
+
+def test_noise_of_the_drive_accelerates_and_where_it_turns_round_more_is_unsure(quiet):
+    w = next(w for w in quiet.windows if np.ptp(np.sign(w.speed)) == 0.0)
+    m = noise_model(quiet.plant, quiet.benches[0], w, turning=True)
+    sigma = quiet.benches[0].noise["i_q"].sigma
+    assert np.median(m.process) == pytest.approx(on_paper.K_T * sigma / on_paper.J, rel=0.01)
+    assert m.damping == pytest.approx(on_paper.C / on_paper.J)
+    assert [f.tolist() for f in m.H] == [[1.0, 0.0], [0.0, 1.0]]
+    assert position_noise(quiet.benches[0], w) == pytest.approx(on_paper.NOISE["theta_m"], rel=0.3)
+
+
+def test_a_start_that_is_off_is_no_fault_of_the_simulation(quiet):
+    b = quiet.benches[0]
+    w = next(w for w in quiet.windows if np.ptp(np.sign(w.speed)) == 0.0)
+    (r,) = quiet.free_run({"F_d": on_paper.F_D}, [quiet.windows.index(w)])
+    left, _ = without_start(quiet.plant, b, w, r)
+    d = on_paper.C / on_paper.J
+    fade = np.exp(-d * (w.t - w.t[0]))
+    elsewhere = np.stack([0.02 + 0.3 * (1.0 - fade) / d, 0.3 * fade])
+    again, _ = without_start(quiet.plant, b, w, r + elsewhere)
+    assert again == pytest.approx(left, abs=1e-9)
+
+
+def test_windows_of_a_record_lie_one_after_the_other_and_come_apart_again(quiet):
+    windows = list(quiet.windows)
+    pack = Pack(quiet.benches[0], list(range(len(windows))), windows, [])
+    parts = pack.split(pack.outputs)
+    assert all((parts[j] == w.outputs).all() for j, w in enumerate(windows))
+    assert pack.filter is None
+    assert pack.drive_by(0.0) is pack.drive
+    late = pack.drive_by(1e-3)
+    assert late.shape == pack.drive.shape
+    assert (late != pack.drive).any()
+    assert set(pack.slide) <= {-1.0, 0.0, 1.0}
+
+
+def test_the_motion_before_a_window_is_followed_once_and_no_further_back_than_it_is_remembered(quiet):
+    windows = list(quiet.windows)
+    offsets, t, _, follows = Pack(quiet.benches[0], list(range(len(windows))), windows, []).history
+    assert not follows[0]
+    assert follows[1:].all()
+    assert [t[b - 1] for b in offsets[1:]] == [w.t[0] for w in windows]
+    assert [t[a] for a in offsets[1:-1]] == [w.t[0] for w in windows[:-1]]  # from where the last one ended
+    apart = [windows[0], windows[-1]]
+    offsets, t, _, follows = Pack(quiet.benches[0], [0, len(windows) - 1], apart, []).history
+    assert follows.tolist() == [False, False]
+    assert t[offsets[1] : offsets[2]].min() == pytest.approx(windows[-1].t[0] - MEMORY, abs=2e-3)
+
+
+def test_what_a_start_known_from_noisy_samples_leaves_scatters_as_foretold():
+    plant = on_paper.plant(on_paper.cycle(), noise={"theta_m": 1e-4, "w_m": 0.05, "i_q": 1e-5})
+    b = plant.benches[0]
+    w = next(w for w in plant.windows if np.ptp(np.sign(w.speed)) == 0.0)
+    d, h, rng = on_paper.C / on_paper.J, np.diff(w.t), np.random.default_rng(3)
+    sigma = np.array([b.noise[name].sigma for name in b.roles.outputs])
+    push = on_paper.K_T * b.noise["i_q"].sigma / on_paper.J
+    squares = []
+    for _ in range(400):
+        state, r = np.zeros(2), np.empty((2, w.n))
+        for k in range(w.n):
+            r[:, k] = state + sigma * rng.standard_normal(2)
+            if k < w.n - 1:
+                fade, a = np.exp(-d * h[k]), push * rng.standard_normal()
+                state = np.array(
+                    [state[0] + (1.0 - fade) / d * state[1] + 0.5 * a * h[k] ** 2, fade * state[1] + a * h[k]]
+                )
+        left, variance = without_start(plant.plant, b, w, r)
+        squares.append(left**2)
+    ratio = np.mean(squares, axis=0) / variance
+    assert ratio[:, -1] == pytest.approx([1.0, 1.0], abs=0.2)
