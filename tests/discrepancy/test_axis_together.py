@@ -125,3 +125,15 @@ def test_the_test_of_agreement_is_right_as_often_as_it_says():
         a = _compared("line", None, samples.mean(axis=0).reshape(2, 2), covariance, 20, needed=False)
         rare.append(a.p < 0.05)
     assert 0.03 < np.mean(rare) < 0.09
+
+
+@pytest.mark.parametrize("last", [1.02, 0.0])
+def test_a_record_that_cannot_show_a_coefficient_neither_agrees_nor_contradicts(last):
+    """As a standstill the inertia, whichever record it is."""
+    values = np.array([[1.0], [1.02 - last], [last]])
+    V = np.diag(np.where(values.ravel() == 0.0, 0.0, 1e-4))
+    a = _compared("inertia", None, values, V, 20, needed=False)
+    sees = tuple(values.ravel() != 0.0)
+    assert (a.shown, a.could) == (sees, sees)
+    assert a.is_one(1)
+    assert a.p > 0.05

@@ -149,3 +149,15 @@ def test_motions_are_joined_end_to_end():
     assert both.w == pytest.approx(np.concatenate([m.w, m.w]))
     assert both.neighbour == "outer"
     assert joined([m, replace(m, neighbour="")]).neighbour == ""
+
+
+def test_a_record_at_rest_leaves_its_inertia_open():
+    moving = motion()
+    rests = moving.record == 1
+    still = replace(moving, a=np.where(rests, 0.0, moving.a), w=np.where(rests, 0.0, moving.w))
+    fit = fitted(rows(still, noise=1e-4), PLAIN, [], apart=True)
+    covariance = dict(zip(fit.base, np.diag(fit.covariance()), strict=True))
+    at = {name: value for name, value in covariance.items() if name.startswith("inertia")}
+    first, last = at.values()
+    assert first > 0.0
+    assert last == 0.0

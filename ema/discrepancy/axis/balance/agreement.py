@@ -26,6 +26,7 @@ from .rows import Rows
 INEXACT = 0.1  # of a coefficient, that another motion may move it by, since no law has quite the right form
 RARE = 0.01  # p below which records do not agree, over all that is asked
 SHOWN = 0.01  # p below which one record shows a law
+UNSEEN = 1e3  # of a coefficient, by which it may be off in a record in which nothing shows it
 
 
 @dataclass(frozen=True)
@@ -121,8 +122,10 @@ def _compared(
 ) -> Agreement:
     """`covariance`: of all values in a row, shape (n_records n_columns,) twice."""
     n_records, n = values.shape
-    c = values.ravel()
-    size = float(np.mean(np.sum(values**2, axis=1)))
+    c, unseen = values.ravel(), np.diag(covariance) == 0.0
+    seen = ~unseen.reshape(n_records, n).any(axis=1)
+    size = float(np.mean(np.sum(values[seen] ** 2, axis=1))) if seen.any() else 0.0
+    covariance = covariance + np.diag(unseen * UNSEEN**2 * size)
     contrast = np.kron(np.eye(n_records)[:-1] - np.eye(n_records)[-1:], np.eye(n))
     d, V, one = contrast @ c, contrast @ covariance @ contrast.T, contrast @ contrast.T
     inexact = V + one * INEXACT**2 * size / n

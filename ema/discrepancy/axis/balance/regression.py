@@ -98,12 +98,18 @@ class Regression:
         return float(np.sum((basis.T @ its) ** 2) / max(float(np.sum(its**2)), 1e-300))
 
     def covariance(self) -> Array:
-        """Of the coefficients, by leaving out one block after the other: rows overlap, and no law is quite right."""
-        size = np.maximum(np.linalg.norm(self.design, axis=0), 1e-300)
-        A, n = self.design / size, self.rows.n_blocks
+        """Of the coefficients, by leaving out one block after the other: rows overlap, and no law is quite right.
+
+        A coefficient that no row shows, as the inertia at a standstill, has none: its rows and columns are 0.
+        """
+        size = np.linalg.norm(self.design, axis=0)
+        seen = size > 0.0
+        A, n = self.design[:, seen] / size[seen], self.rows.n_blocks
         parts = [(A[own], self.left[own]) for own in (self.rows.block == b for b in range(n))]
         moved = blocks_left_out.covariance(A.T @ A, ((P.T @ P, P.T @ r) for P, r in parts), LEAST)
-        return np.asarray(moved / np.outer(size, size))
+        out = np.zeros((len(size), len(size)))
+        out[np.ix_(seen, seen)] = moved / np.outer(size[seen], size[seen])
+        return out
 
 
 def fitted(rows: Rows, plain: Plain, laws: Sequence[Law], *, apart: bool = False) -> Regression:
