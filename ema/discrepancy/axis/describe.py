@@ -13,7 +13,7 @@ from ema.models.axis_config import LinearAxis
 
 from .balance.telling_records import INTERVAL
 from .cogging import MIN_LINE
-from .linear import by_drive, in_metres
+from .linear import by_drive, of_axis
 from .naming import numbers_of
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Se
                 "key": candidate.key,
                 "name": effect.name,
                 "sentence": said(effect.said(values)),
-                "separated_by": effect.separated_by,
+                "separated_by": said(effect.separated_by),
                 "mistaken_for": list(effect.mistaken_for),
                 "parameters": parameters,
             }
@@ -59,8 +59,8 @@ def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Se
 
 def _said(plant: Measured) -> Callable[[str], str]:
     """How sentences and units are said of this axis and its drive."""
-    units = in_metres if isinstance(plant.plant, LinearAxis) else str
-    return lambda text: units(by_drive(text, plant.plant.drive))
+    linear = isinstance(plant.plant, LinearAxis)
+    return lambda text: of_axis(by_drive(text, plant.plant.drive), linear=linear)
 
 
 def _line(plant: Measured, values: dict[str, float]) -> dict[str, Any]:

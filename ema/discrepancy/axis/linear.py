@@ -1,4 +1,4 @@
-"""What is said of a rotary axis, in the units of a linear one."""
+"""What is said of an effect, for an axis: it has no user apart from it, and a linear one has metres and newtons."""
 
 from __future__ import annotations
 
@@ -33,6 +33,22 @@ def by_drive(text: str, drive: str) -> str:
     if drive in ("force", "torque"):
         for said, instead in RECORDED.items():
             text = text.replace(said, instead.format(drive=drive))
+    return text
+
+
+APART = {
+    " at the user it": " behind it, it",
+    " at the user": "",
+    "θ_u": "θ_m",
+}  # of those that begin alike the longest first
+
+
+def of_axis(text: str, *, linear: bool) -> str:
+    """A sentence or a unit of an effect, as it is said of an axis."""
+    if linear:
+        text = in_metres(text)
+    for said, instead in APART.items():
+        text = text.replace(said, instead)
     return text
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ from .balance.as_effects import effects
 from .balance.found import Balance, Term
 from .balance.telling import drawn
 from .balance.telling_records import INTERVAL
-from .linear import in_metres
+from .linear import of_axis
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -43,7 +44,7 @@ def named(b: Balance, term: Term) -> str:
 
 def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.FoundEffect:
     effect, linear = registry()[name], isinstance(plant.plant, LinearAxis)
-    said = in_metres if linear else str
+    said = partial(of_axis, linear=linear)
     values = effects(b, term)[name]
     samples = [effects(b, term, c)[name] for c in drawn(b)]
     units = {p.name: said(p.unit) for p in effect.parameters}
@@ -57,5 +58,5 @@ def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.Found
     others = tuple(sorted({*term.alike, *term.law.also}))
     confidence = round(b.of_set(term) / (1 + len(others)), 4)  # those in a set share what is sure of it
     return shared.FoundEffect(
-        name, confidence, others, parameters, said(effect.said(values)) + ALONE, effect.separated_by
+        name, confidence, others, parameters, said(effect.said(values)) + ALONE, said(effect.separated_by)
     )  # fmt: skip

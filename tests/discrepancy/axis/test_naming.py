@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis.linear import by_drive, in_metres
+from ema.discrepancy.axis.linear import by_drive, in_metres, of_axis
 from ema.discrepancy.axis.naming import line, numbers_of, torque_line
+from ema.effects import registry
 
 
 def test_a_point_is_sorted_by_what_its_names_mean():
@@ -47,3 +48,12 @@ def test_what_is_said_of_a_linear_axis_has_no_radians(rotary, linear):
 def test_where_the_torque_itself_is_recorded_nothing_is_per_ampere():
     assert by_drive("N m/A", "torque") == "1"
     assert by_drive("N m/A", "current") == "N m/A"
+
+
+@pytest.mark.parametrize("name", ["constant_load", "position_friction", "spring_load", "gear_compliance"])
+@pytest.mark.parametrize("linear", [False, True])
+def test_an_axis_has_no_user_apart_from_it(name, linear):
+    effect = registry()[name]
+    said = of_axis(effect.said({p.name: 1.0 for p in effect.parameters}) + effect.separated_by, linear=linear)
+    assert "user" not in said
+    assert "θ_u" not in said
