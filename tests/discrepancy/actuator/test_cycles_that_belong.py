@@ -84,6 +84,12 @@ def another_sign(good):
     return {f"i_{x}": -good[f"i_{x}"] for x in "abc"}
 
 
+def of_something_else(good):
+    """Currents under noise of another machine."""
+    rng = np.random.default_rng(6)
+    return {f"i_{x}": good[f"i_{x}"] + 6.0 * rng.standard_normal(len(good["t"])) for x in "abc"}
+
+
 @pytest.mark.parametrize(
     ("change", "why"),
     [
@@ -93,6 +99,7 @@ def another_sign(good):
         (clipped, "i_a is clipped at 1 A"),
         (apart, "the currents come .* position and command: channels are not synchronised"),
         (another_sign, "do not follow|not synchronised"),
+        (of_something_else, "the currents do not follow position and command"),
     ],
 )
 def test_what_does_not_belong_is_refused_with_its_reason(good, shipped_plant, change, why):

@@ -180,3 +180,4 @@ def test_a_line_without_a_name_that_is_missed_is_told_and_the_causes_explain_a_p
     assert (made.verdict, made.model.names) == ("partly explained", ("viscous_drag", "torque_line"))
     assert made.left.residual.rest == pytest.approx(3.0)
     assert made.error.rest == pytest.approx(1.0)
+    assert not made.left.is_chance  # what the causes alone leave is asked, not what the line leaves

@@ -116,14 +116,14 @@ def test_a_rest_that_only_one_cycle_shows_asks_for_that_motion_again():
     assert recorded([0, 0, 1], [0, 2], [1], loud=[0, 2]) == []  # held-out cycles show it too
 
 
-def found(sd_fit, sd_score, rest):
+def found(sd_fit, sd_score, rest, of=("viscous_drag",)):
     name = "viscous_drag.coefficient"
     free = (SimpleNamespace(name=name, low=0.0, high=1.0),)
     answer = named("viscous_drag", point={name: 6e-5}, sd={name: sd_fit}, free=free)
-    own = weighed(("viscous_drag",), point={name: 6e-5}, sd={name: sd_score})
+    own = weighed(of, point={name: 6e-5}, sd={name: sd_score})
     parameter = SimpleNamespace(name=name)
     own.entrant.causes = (SimpleNamespace(name="viscous_drag", parameters=(parameter,)),)
-    outcome = Outcome([Entry(("viscous_drag",), 1.0, 0.0, 0.0)], [own])
+    outcome = Outcome([Entry(of, 1.0, 0.0, 0.0)], [own])
     return telling._found(None, answer, "viscous_drag", (), rest, outcome)
 
 
@@ -135,6 +135,8 @@ def test_an_interval_is_as_wide_as_what_is_left_and_as_the_wider_of_fit_and_scor
     assert 0.98 < e.confidence < 1.0  # what does it may not be in the library at all
     wider = found(5e-6, 1e-6, rest=0.0).parameters["coefficient"]
     assert wider.high - wider.low > 4.0 * (q.high - q.low)
+    larger = ("viscous_drag", "inertia")  # the answer itself was not weighed
+    assert found(5e-6, 1e-6, 0.0, larger).parameters["coefficient"].high == pytest.approx(wider.high, rel=0.01)
     left = found(1e-6, 1e-6, rest=1.0).parameters["coefficient"]
     assert left.high - left.low == pytest.approx(2 * 1.96 * 0.5 * 6e-5, rel=0.05)
     assert left.low >= 0.0
@@ -154,9 +156,10 @@ def examined(hidden, shipped_plant):
         plant, n_motions = shipped_plant, 2
 
         def __init__(self):
-            self.data, self.slices = data, [slices(g) for g in groups]
+            self.data, self.slices, self.asked = data, [slices(g) for g in groups], 0
 
         def repeated(self, points, cycles, n_seeds, seed, steps=None):
+            self.asked += len(points)
             off = [1.0 - 0.2 * ("k1" not in point) for point in points]
             return [
                 {c: Runs((x * data.y[c])[None], (x * data.envelopes[c][::ENVELOPE_STEP])[None]) for c in cycles}
@@ -190,7 +193,9 @@ TITLES = [
 
 
 def test_a_report_of_an_actuator_shows_where_and_before_and_after(examined):
-    full, alone = shown(examined), shown(examined, after_is_before=True)
+    alone, once = shown(examined, after_is_before=True), examined.plant.asked
+    full = shown(examined)
+    assert examined.plant.asked == 3 * once  # where nothing was found, nothing is drawn twice
     assert [p.title for p in full] == [p.title for p in alone] == TITLES
     assert all(p.png.startswith(b"\x89PNG") for p in full)
     assert all(a.png != b.png for a, b in zip(full[:4], alone[:4], strict=True))  # what was found is drawn

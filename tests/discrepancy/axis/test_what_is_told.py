@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import on_paper
 import pytest
-from balance_on_paper import PLAIN, motion, rows
+from balance_on_paper import PLAIN, J, motion, rows
 
 from ema.discrepancy.axis.balance.agreement import agreements
 from ema.discrepancy.axis.balance.attenuation import attenuation
@@ -95,6 +95,16 @@ def test_a_linear_axis_is_told_in_metres():
     assert "rad" not in entry["sentence"]
 
 
+def inertia_error():
+    """Deviation of the inertia that the noise makes in one record, exactly: 300 means beside friction and drag."""
+    m = motion()
+    every = (m.a, m.direction, m.w, m.w * np.abs(m.w))
+    a, *others = (x[:3000].reshape(300, 10).mean(axis=1) for x in every)
+    beside = np.column_stack(others)
+    left = a - beside @ np.linalg.lstsq(beside, a, rcond=None)[0]
+    return 2e-3 / np.linalg.norm(left)
+
+
 def of_two_records(torque):
     m = motion()
     found = replace(rows(m, torque(m), noise=2e-3), known={})
@@ -118,6 +128,10 @@ def test_records_that_agree_say_so_and_of_each_coefficient():
         (q,) = entry["records"][name].values()
         assert q["low"] < 2e-3 < q["high"]
         assert q["high"] - q["low"] < 1e-3
+    for name in ("one", "two"):
+        q = told["inertia"]["records"][name]["value"]
+        assert q["low"] < J < q["high"]
+        assert q["high"] - q["low"] == pytest.approx(4.0 * inertia_error(), rel=0.5)
     assert told_of(lambda m: 0.0 * m.w, linear=True)["inertia"]["records"]["one"]["value"]["unit"] == "kg"
 
 

@@ -30,6 +30,11 @@ def test_inertia_drag_and_friction_come_back():
     assert found.orders == ()
 
 
+def test_fast_motion_is_seen_through_the_filter_that_takes_its_derivative():
+    swing = on_paper.Swing(((2.5, 2.3, 0.3), (0.02, 180.0, 1.1)))
+    assert fit_of(on_paper.cycle(swing=swing)).inertia == pytest.approx(on_paper.J, rel=0.02)
+
+
 def test_a_torque_locked_to_the_angle_stands_beside_them():
     found = fit_of(on_paper.cycle(lambda t, theta, w: 0.01 * np.sin(12 * theta)))
     assert found.orders == (12.0,)
@@ -72,6 +77,7 @@ def test_of_a_voltage_the_torque_is_what_resistance_leaves():
     channels = {"t": cycle["t"], "theta_m": cycle["theta_m"], "w_m": cycle["w_m"], "u_q": u}
     own = known(Record((Cycle(0, channels),)), k_t=on_paper.K_T, R=0.8, brushed=True)
     assert float(own["J"].value.split()[0]) == pytest.approx(on_paper.J, rel=0.05)
+    assert float(own["C"].value.split()[0]) == pytest.approx(on_paper.C, rel=0.3)  # a tenth of the back-EMF's drag
     guessed = known(Record((Cycle(0, channels),)), k_t=on_paper.K_T)
     assert "give --R" in guessed["R"].origin
     assert "a guess" in guessed["J"].origin
