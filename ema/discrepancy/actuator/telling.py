@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ema.core.names import FAULTS
-from ema.discrepancy.engine.contest import Outcome, Weighed
+from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.engine.posterior import p_cause
 from ema.discrepancy.findings import WITHIN, Findings, FoundEffect, Gain, Quantity
 from ema.discrepancy.plant import Point
@@ -18,6 +18,7 @@ from . import controller, repeating
 from .entrants import as_told
 from .extension import as_extension
 from .fit import SEED, Fit
+from .intervals import FORM, deviation, of_faults
 from .leave_out import over_folds, square
 from .model import CHANCE, FINAL_SEED, N_FINAL, Model
 from .noise import SEED as NOISE_SEED
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from .search import Search
 
 IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
-FORM = 0.5  # of a value, for a rest as large as the whole effect: the interval holds what would take all of the rest
 MOST_OF_IT = 0.95  # share of what faults alone leave that effects must explain to be named beside an unexplained rest
 UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: a rest is left that nothing explains
 IN_LIBRARY = 0.99  # probability that what does it is in the library at all, where it leaves nothing
@@ -99,7 +99,7 @@ def told(
         unnamed = [replace(unnamed[0], sentence=f"a further {registry()['cogging'].said(values)}")]
         notes.append(f"beside it stands {unnamed[0].sentence}")
     return Findings(
-        made.verdict, found, _gain(search, before, made.model, made, outcome), shape, tried, notes,
+        made.verdict, found, _gain(search, before, made.model, v, made, outcome), shape, tried, notes,
         unnamed=unnamed, posterior=as_told(outcome), rejected=rejected(search, before, after, outcome), seeds=SEEDS,
         rest=0.0 if made.left.is_chance else made.left.residual.rest,
     )  # fmt: skip
@@ -205,7 +205,7 @@ def _found(
 ) -> FoundEffect:
     """What was fitted as `effect`, told as that or as another effect with the same parameters.
 
-    With the probability and the sizes that all sets of causes together give it, and an interval by both (`_sd`).
+    With the probability and the sizes that all sets of causes together give it, and an interval by both (`deviation`).
     `rest` is the amplitude of what is left above noise over that of what there was.
     """
     e = registry()[told_as or effect]
@@ -217,7 +217,7 @@ def _found(
         name = f"{effect}.{p.name}"
         if name in bounds:
             value, own = sizes[name]
-            parts = [_sd(name, own, model, outcome), IMPLEMENTATION * value, FORM * rest * value]
+            parts = [deviation(name, own, model, outcome), IMPLEMENTATION * value, FORM * rest * value]
             sd = float(np.linalg.norm([*parts, e.least_sd.get(p.name, 0.0)]))
             f = bounds[name]
             values[p.name] = value
@@ -242,7 +242,7 @@ def _envelope_error(search: Search, point: Point, cycles: list[int]) -> float:
     return float(np.sqrt(np.mean([square(search.plant, c, runs[c].envelopes.mean(axis=0)) for c in cycles])))
 
 
-def _gain(search: Search, before: Model, after: Model, made: Remains, outcome: Outcome) -> Gain:
+def _gain(search: Search, before: Model, after: Model, v: Verdict, made: Remains, outcome: Outcome) -> Gain:
     k_before, k_after = (tuple(round(m.fit.point.get(n, 0.0), 5) for n in FAULTS) for m in (before, after))
     return Gain(
         _envelope_error(search, before.fit.point, search.train),
@@ -254,36 +254,7 @@ def _gain(search: Search, before: Model, after: Model, made: Remains, outcome: O
         k_after,
         sum(x > FAULT_ALARM for x in k_before),
         sum(x > FAULT_ALARM for x in k_after),
-        tuple(_interval_of_fault(name, after, outcome) for name in FAULTS),
+        of_faults(search, after, outcome, v.is_noise),
         folds=made.error,
         residual=made.left.residual,
     )
-
-
-def _weighed(model: Model, outcome: Outcome) -> Weighed | None:
-    """The set of a model's effects as it was weighed."""
-    return next((w for w in outcome.weighed if set(w.entrant.names) == set(model.names)), None)
-
-
-def _sd(name: str, score: float, model: Model, outcome: Outcome) -> float:
-    """Standard deviation of a parameter: that of the `score`, as much wider as the fit's is beside the same faults.
-
-    The score knows no simulation but its own, and by itself claims 0.02 % of a compliance that another simulation has
-    0.6 % off; the fit knows how motions and honest simulations scatter, but keeps faults free that the score has
-    dropped. Where a weaker magnet is alone for certain, its size does not share the doubt about three shorts beside it.
-    """
-    own, fit = _weighed(model, outcome), model.fit.sd.get(name, 0.0)
-    if own is None or name not in own.sd:
-        return max(score, fit)
-    beside_the_same = own.sd_beside([f.name for f in model.fit.free])[name]
-    return score * max(1.0, fit / beside_the_same) if beside_the_same > 0.0 else max(score, fit)
-
-
-def _interval_of_fault(name: str, model: Model, outcome: Outcome) -> tuple[float, float]:
-    """Interval of 95 %, by score and fit, and where these disagree, both."""
-    k = model.fit.point.get(name, 0.0)
-    sd = model.fit.sd.get(name, 0.0)
-    own = _weighed(model, outcome)
-    if own is not None and name in own.sd:
-        sd = float(np.hypot(_sd(name, own.sd[name], model, outcome), own.point[name] - k))
-    return max(k - WITHIN * sd, 0.0), min(k + WITHIN * sd, 1.0)

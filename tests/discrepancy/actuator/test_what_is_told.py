@@ -46,19 +46,6 @@ def test_a_rival_is_as_likely_as_the_set_with_it_in_the_effects_place():
     assert telling.probabilities(outcome, answer, "inertia") == pytest.approx([1.0])
 
 
-def test_an_interval_of_a_fault_holds_fit_and_score_and_stays_between_nothing_and_all():
-    alone = named(point={"k1": 0.05}, sd={"k1": 0.01})
-    nobody = Outcome([], [])
-    assert telling._interval_of_fault("k1", alone, nobody) == pytest.approx((0.05 - 0.0196, 0.05 + 0.0196))
-    assert telling._interval_of_fault("k2", alone, nobody) == (0.0, 0.0)
-    apart = Outcome([], [weighed((), point={"k1": 0.15}, sd={"k1": 0.01})])
-    low, high = telling._interval_of_fault("k1", alone, apart)
-    assert low == 0.0
-    assert high > 0.15  # where the two disagree it holds both
-    sure = named(point={"k1": 0.99}, sd={"k1": 0.1})
-    assert telling._interval_of_fault("k1", sure, nobody)[1] == 1.0
-
-
 @pytest.mark.parametrize(
     ("order", "sd", "is_whole"), [(12.02, 1e-3, True), (12.3, 1e-3, False), (12.3, 0.15, True), (35.99, 1e-3, True)]
 )
