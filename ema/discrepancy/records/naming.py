@@ -77,7 +77,7 @@ def propose(table: Table) -> list[Proposal]:
             if _is_commanded_drive(title, what):
                 said += "; commanded, and taken for what acts since no measured one is there"
             if unit is None and CHANNELS[channel].unit != "1":
-                own = titled(title)[1] or table.units.get(index)
+                own = _own_unit(title) or table.units.get(index)
                 unread = f"[{own}] is no unit that is known" if own else "the file gives no unit"
                 said += f"; {unread}: is it {CHANNELS[channel].unit}?"
             found[index] = Proposal(title, channel, unit or CHANNELS[channel].unit, said)
@@ -96,7 +96,7 @@ def _is_commanded_drive(title: str, what: str | None) -> bool:
 
 def _of_its_own_scale(title: str, apart: str | None, channel: str) -> str | None:
     """What to write for a column in counts, or in per cent of a rating, which only its owner knows; None for others."""
-    unit = titled(title)[1] or apart
+    unit = _own_unit(title) or apart
     last = (unit or titled(title)[0].split(" ")[-1].split("_")[-1]).strip().lower()
     if last in _COUNTS:
         return f"counts of an encoder: {{channel: {channel}, unit: turn, scale: 2.44140625e-4}} where 4096 are a turn"
@@ -106,13 +106,19 @@ def _of_its_own_scale(title: str, apart: str | None, channel: str) -> str | None
     return None
 
 
+def _own_unit(title: str) -> str | None:
+    """The unit in a title, which may be nothing but that: ``[turns/s]``."""
+    only = re.fullmatch(r"\s*[\[(](.+)[\])]\s*", title)
+    return only[1].strip() if only else titled(title)[1]
+
+
 def _written(unit: str | None) -> str | None:
     return None if unit is None else _WRITTEN.get(unit.lower().replace(" ", ""), unit)
 
 
 def _quantity(title: str, apart: str | None) -> tuple[str | None, str | None]:
     """What is measured and its unit, None where not known; a unit of the file counts more than a word."""
-    unit = _written(titled(title)[1] or apart)
+    unit = _written(_own_unit(title) or apart)
     if unit is not None:
         for what, target in _UNITS.items():
             if _converts(unit, target):

@@ -77,6 +77,13 @@ def channels(answer):
             },
         ),
         (
+            "[ms],[V],[turns],[turns/s]", "",
+            {
+                "[ms]": ("t", "ms"), "[V]": ("u_q", "V"), "[turns]": ("theta_m", "turns"),
+                "[turns/s]": ("w_m", "turns/s"),
+            },
+        ),
+        (
             "t [s],force cmd [N],x pos [mm]", "",
             {"t [s]": ("t", "s"), "force cmd [N]": ("force", "N"), "x pos [mm]": ("q", "mm")},
         ),
