@@ -74,6 +74,11 @@ def test_one_record_tells_a_neighbour_by_the_motor_s_own_orders_only(bench, decl
     assert e.confidence == pytest.approx(confidence, abs=0.01)
 
 
+def test_a_set_with_a_neighbour_is_no_surer_than_the_line(bench):
+    (e,) = with_external(bench((OWN,)), [cogging(12.0, 0.63)])
+    assert e.of_set == pytest.approx(0.63, abs=1e-3)
+
+
 def test_what_acts_in_some_records_is_said_in_the_extended_model_and_acts_in_none(bench, tmp_path):
     (e,) = with_external(bench((OWN,), (OWN, NEIGHBOUR)), [])
     plant = tmp_path / "plant.yaml"

@@ -55,6 +55,7 @@ def _beside(plant: AxisPlant, e: shared.FoundEffect) -> shared.FoundEffect:
     return replace(
         e,
         confidence=round((1.0 - share) * e.confidence, 4),
+        of_others=round(share * e.confidence, 4),
         indistinguishable_from=(NAME,),
         sentence=f"{e.sentence}, or a torque from outside the motor (a neighbour's magnets){reason}",
         separated_by=f"{e.separated_by}; {registry()[NAME].separated_by}",
