@@ -10,6 +10,7 @@ import pytest
 from ema.discrepancy.actuator.fit import fit
 from ema.discrepancy.actuator.free import Free
 from ema.discrepancy.actuator.noise import MotionNoise, Noise
+from ema.discrepancy.engine.statistic import Root
 
 N = 400  # features of a cycle
 BENT = 0.7
@@ -44,10 +45,11 @@ def noise_of(plant: Toy) -> Noise:
     noise = object.__new__(Noise)
     fresh = np.random.default_rng(9).standard_normal((60, N))
     noise.plant, noise.point = plant, {}
-    noise.motions = [MotionNoise(np.ones(N), np.eye(N), np.ones(1), fresh, np.arange(60) % 2)]
+    noise.motions = [MotionNoise(np.ones(N), WHITE, np.ones(1), fresh, np.arange(60) % 2)]
     return noise
 
 
+WHITE = Root(np.zeros((N, 1)), np.ones(1), 1.0)  # already
 FREES = tuple(Free(name, -2.0, 2.0, 0.05) for name in ("k1", "k2", "toy.x"))
 
 
