@@ -161,3 +161,4 @@ def test_a_record_at_rest_leaves_its_inertia_open():
     first, last = at.values()
     assert first > 0.0
     assert last == 0.0
+    assert fit.coefficients[fit.base.index(next(reversed(at)))] == pytest.approx(0.0, abs=1e-9)

@@ -157,7 +157,8 @@ def _base(rows: Rows) -> tuple[tuple[str, ...], Array]:
 
 
 def _solved(design: Array, y: Array) -> Array:
-    size = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
+    size = np.linalg.norm(design, axis=0)
+    size = np.where(size > 0.0, size, 1.0)  # of what no row shows the coefficient is 0, and no digit of it over nothing
     A = design / size
     return _of_normal(A.T @ A, A.T @ y) / size
 
