@@ -13,21 +13,26 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ema.discrepancy import findings as shared
+from ema.discrepancy.grade import NAMED
 from ema.discrepancy.plant import Point
 
 from .balance.as_effects import effects
-from .balance.found import Balance
+from .balance.found import Balance, Term
 from .beside import balance_beside
 from .named_laws import missing, named, of_balance
+from .witness import support
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
 
 
 def together(
-    plant: AxisPlant, found: Sequence[shared.FoundEffect], verdict: str, point: Point
+    plant: AxisPlant, found: Sequence[shared.FoundEffect], verdict: str, point: Point, *, follows: bool = False
 ) -> tuple[list[shared.FoundEffect], Balance | None]:
-    """Effects as free runs found them at `point`, with what the balance says of them, and a balance that adds some."""
+    """Effects as free runs found them at `point`, with what the balance says of them, and a balance that adds some.
+
+    Where free runs follow the motion (`follows`), a law is as sure as they need it too.
+    """
     b = plant.balance
     out = list(found)
     for term in b.terms if b is not None else ():
@@ -43,9 +48,17 @@ def together(
     if found:
         b = balance_beside(plant, point)
     added = missing(b, out) if b is not None else []
+    if b is not None and follows:
+        added = [_as_needed(t, support(plant, point, b, t)) for t in added]
+        added = [t for t in added if b.of_set(t) >= NAMED]
     if b is None or not added:
         return out, None
     return [*out, *of_balance(plant, b, added)], b
+
+
+def _as_needed(term: Term, share: float) -> Term:
+    """A law and what does as well, each as sure as `share` allows."""
+    return replace(term, wins=share * term.wins, alike={name: share * wins for name, wins in term.alike.items()})
 
 
 def _is_same(e: shared.FoundEffect, values: dict[str, float]) -> bool:

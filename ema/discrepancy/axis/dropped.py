@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ema.core.records import Array
-from ema.discrepancy.fitting import WILD, Fit, best_fit
+from ema.discrepancy.fitting import Fit, best_fit
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Candidate, Free
 from ema.discrepancy.trust import at_bound
 from ema.models.axis_config import LinearAxis
 
 from .linear import in_metres
+from .witness import N_ITERATIONS, excess
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -28,7 +28,6 @@ LEFT = 0.02  # mean square above that of noise, from which there is something to
 SHARE = 0.1  # of what is left above noise that it must take
 MOST = 3  # effects
 WIDER = (10.0, 100.0)  # times the bound
-N_ITERATIONS = 8
 
 
 def dropped(plant: AxisPlant, outcome: Outcome, named: set[str]) -> list[dict[str, Any]]:
@@ -36,7 +35,7 @@ def dropped(plant: AxisPlant, outcome: Outcome, named: set[str]) -> list[dict[st
     if outcome.verdict == "adequate":
         return []
     blocks = list(range(len(plant.blocks)))
-    here = _excess(plant.residuals([outcome.point], blocks)[0])
+    here = excess(plant.residuals([outcome.point], blocks)[0])
     if here < LEFT:
         return []
     scores = _scores(outcome)
@@ -45,11 +44,11 @@ def dropped(plant: AxisPlant, outcome: Outcome, named: set[str]) -> list[dict[st
     told = []
     for candidate in ranked:
         fitted = _fit(plant, outcome, candidate, blocks)
-        share = 1.0 - _excess(fitted.residuals) / max(here, 1e-300)
+        share = 1.0 - excess(fitted.residuals) / max(here, 1e-300)
         at = [f for f in candidate.free if at_bound(f, fitted.point[f.name]) and not f.is_shape]
         wider = [_wider(plant, outcome, candidate, at, factor, here) for factor in WIDER] if at else []
         if max([share, *(s for s, _ in wider)]) > SHARE:
-            after = float(np.sqrt(1.0 + _excess(fitted.residuals)))
+            after = float(np.sqrt(1.0 + excess(fitted.residuals)))
             why = _why(plant, candidate, fitted, share, at, [text for _, text in wider])
             unknown = dict.fromkeys(("nats", "nats_error", "nats_of"))  # held-out parts do not decide it
             told.append(
@@ -68,12 +67,6 @@ def _scores(outcome: Outcome) -> dict[str, float]:
     return out
 
 
-def _excess(residuals: Sequence[Array]) -> float:
-    """Mean square above that of noise."""
-    r = np.concatenate([block.ravel() for block in residuals])
-    return max(float(np.mean(np.clip(r, -WILD, WILD) ** 2)) - 1.0, 0.0)
-
-
 def _fit(plant: AxisPlant, outcome: Outcome, candidate: Candidate, blocks: Sequence[int]) -> Fit:
     starts = [{**outcome.point, **start} for start in candidate.starts]
     return best_fit(plant, [*plant.base, *candidate.free], starts, blocks, max_iterations=N_ITERATIONS)
@@ -86,7 +79,7 @@ def _wider(
     names = {f.name for f in at}
     free = tuple(replace(f, low=f.low * factor, high=f.high * factor) if f.name in names else f for f in candidate.free)
     fitted = _fit(plant, outcome, replace(candidate, free=free), range(len(plant.blocks)))
-    share = 1.0 - _excess(fitted.residuals) / max(here, 1e-300)
+    share = 1.0 - excess(fitted.residuals) / max(here, 1e-300)
     values = ", ".join(_said(plant, f, fitted) for f in free if f.name in names)
     still = any(at_bound(f, fitted.point[f.name]) for f in free if f.name in names)
     return share, f"{factor:g} times as wide {values}{', its end again' if still else ''}, and it explains {share:.0%}"

@@ -35,11 +35,15 @@ def screened(balance: Balance | None, plant: Axis, point: Point) -> list[Candida
         for name, values in (instead(balance, term) | effects(balance, term)).items():
             if name not in SCREENED:
                 continue
-            if name not in LINES:
-                out += [] if name in have else [_candidate(name, values)]
-            elif not line_point(name, values).keys() & point.keys():
-                out.append(_line(name, values))
+            law = begun(name, values)
+            if not ({f.name for f in law.free} & point.keys() if name in LINES else name in have):
+                out.append(law)
     return out
+
+
+def begun(name: str, values: dict[str, float]) -> Candidate:
+    """An effect that is fitted from where the balance has it."""
+    return (_line if name in LINES else _candidate)(name, values)
 
 
 def _line(name: str, values: dict[str, float]) -> Candidate:

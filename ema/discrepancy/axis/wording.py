@@ -30,8 +30,8 @@ from .next_records import next_records
 from .plant import AxisPlant
 from .plausible import implausible
 from .plausible import told as electrical
+from .ruling import WITNESS, ruling
 from .ruling import gain as of_balance
-from .ruling import ruling
 
 MOVED = 0.02  # of the plant file's friction: less is not worth a word
 
@@ -82,7 +82,9 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         gain = shared.Gain(**of_balance(plant.balance, rules.left, outcome, isinstance(plant.plant, LinearAxis)))
         notes, structure = [rules.note], {}
     else:
-        found, by_balance = together(plant, [_effect(e) for e in outcome.effects], outcome.verdict, outcome.point)
+        follows = outcome.heldout.noise_floor <= WITNESS
+        told_by_runs = [_effect(e) for e in outcome.effects]
+        found, by_balance = together(plant, told_by_runs, outcome.verdict, outcome.point, follows=follows)
         verdict = graded(outcome.left, named=True) if by_balance is not None and outcome.left else outcome.verdict
     found = with_external(plant, found)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]

@@ -1,0 +1,43 @@
+"""A law that the balance adds is as sure as free runs that follow the motion need it too."""
+
+from __future__ import annotations
+
+import pytest
+
+from ema.discrepancy.axis import witness
+from ema.discrepancy.axis.agreeing import together
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.models.axis_config import RotaryAxis
+
+
+@pytest.fixture(scope="module")
+def plant(support):
+    geared = support("geared")
+    axis = geared.Axis(dry_slope=0.04)
+    found = AxisPlant(RotaryAxis.model_validate(geared.plant(axis)), [geared.record(axis, 1, seconds=8.0)], n_threads=1)
+    found.between = "held"
+    return found
+
+
+def plain(plant):
+    return {f.name: f.start for f in plant.base}
+
+
+def names(answer):
+    return [e.name for e in answer[0]]
+
+
+def test_a_law_that_is_there_takes_from_free_runs_what_it_takes_from_the_balance(plant):
+    (term,) = plant.balance.terms
+    assert term.law.name == "friction_slope"
+    assert witness.support(plant, plain(plant), plant.balance, term) > 0.9
+    assert "friction_slope" in names(together(plant, [], "unexplained", plain(plant), follows=True))
+
+
+def test_a_law_that_does_nothing_in_free_runs_is_not_added(plant, monkeypatch):
+    """Friction by a load that the model has not."""
+    monkeypatch.setattr(witness, "effects", lambda *_: {"output_load_friction": {"share": 0.1}})
+    (term,) = plant.balance.terms
+    assert witness.support(plant, plain(plant), plant.balance, term) < 0.1
+    assert names(together(plant, [], "unexplained", plain(plant), follows=True)) == []
+    assert names(together(plant, [], "unexplained", plain(plant))) == ["friction_slope"]
