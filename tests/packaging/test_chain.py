@@ -87,12 +87,17 @@ def before(folder, coarse_bundle):
 
 
 def test_magnet_flux_is_named_from_a_file_and_extends_the_plant(folder):
-    """A weaker magnet reads as three shorted phases until it is named beside them; `extended.yaml` then holds it."""
+    """A weaker magnet reads as three shorted phases until it is named beside them; `extended.yaml` then holds it.
+
+    Of three cycles it hangs on the noise whether the shorts leave more than chance: they are in its set, or rejected.
+    """
     out = folder / "found"
     findings = json.loads((out / "findings.json").read_text())
     assert findings["verdict"] == "explained"
     assert [e["name"] for e in findings["effects"]] == ["magnet_flux"]
-    assert findings["effects"][0]["indistinguishable_from"] == ["k3 and k4 and k5 alike"]
+    rivals = findings["effects"][0]["indistinguishable_from"]
+    assert rivals in ([], ["k3 and k4 and k5 alike"])
+    assert findings["posterior"][0]["effects"] == ["magnet_flux"]
     assert findings["effects"][0]["parameters"]["change"]["value"] == pytest.approx(FLUX, abs=0.004)
     assert min(findings["gain"]["k_before"][2:5]) > 0.04
     assert max(findings["gain"]["k_after"][1:]) < 0.02
@@ -102,8 +107,8 @@ def test_magnet_flux_is_named_from_a_file_and_extends_the_plant(folder):
     assert low < extended.effects["magnet_flux"]["change"] < high
     assert yaml.safe_load((out / "extended.yaml").read_text())["kind"] == "ema"
     report = (out / "report.html").read_text()
-    assert "One of 2 that fit alike" in report
-    assert "magnet flux changed by -6.0%" in report
+    assert ("One of 2 that fit alike" in report) == bool(rivals)
+    assert "magnet flux changed by -6.0%" in report.lower()
     assert "http" not in report.replace("http-equiv", "")
 
 
