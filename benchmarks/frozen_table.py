@@ -58,6 +58,17 @@ def table(rows: Sequence[Row]) -> str:
     return "\n\n".join(parts)
 
 
+def beside(rows: Sequence[Row], others: Sequence[Row]) -> str:
+    """Two commits on the trials that both have; MixedCommitsError where either's rows are of several."""
+    commits = [f"`{of_one_commit(of)[:9]}`" for of in (rows, others)]
+    own, other = ({(row["stratum"], row["number"], row["seed"]): row for row in of} for of in (rows, others))
+    both = [key for key in own if key in other]
+    ends = [[row for row in (of[key] for key in both) if row["outcome"] != "refused"] for of in (own, other)]
+    lines = [(what, old, new) for (what, new, _), (_, old, _) in zip(*map(_aims, ends), strict=True)]
+    head = f"The {len(both)} trials that {' and '.join(commits)} have in common, with what is refused left out."
+    return f"{head}\n\n{_markdown(('what', commits[1], commits[0]), lines)}"
+
+
 def _markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

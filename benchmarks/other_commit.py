@@ -1,11 +1,12 @@
 """Frozen trials by the finder of another commit, so that two finders stand beside each other on the same records.
 
     git worktree add /tmp/old ee42f01 && make -C /tmp/old env
-    python -m benchmarks.other_commit benchmarks/trials/frozen-f7dd931.jsonl /tmp/old --out var/old.jsonl
-    python -m benchmarks.frozen --render var/old.jsonl
+    python -m benchmarks.other_commit benchmarks/trials/frozen-f7dd931.jsonl --checkout /tmp/old --out var/old.jsonl
 
 Both are given what the rows' seeds draw. The other one gets it as files, a plant file and a CSV record, by its own
-command `ema discrepancy`: what a command reads and writes is all that commits have in common. Resumable, as `frozen`.
+command `ema discrepancy`: what a command reads and writes is all that commits have in common. Resumable, as `frozen`;
+prints both beside each other, and runs nothing without a checkout. Rows whose strata were drawn by other code than
+this commit's need the benchmarks of the commit that drew them.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import Any
 import click
 
 from benchmarks import discrepancy, frozen, frozen_axis, strata, strata_axis
+from benchmarks.frozen_table import beside
 from ema.core.csv_records import write_csv
 from ema.core.records import Record
 
@@ -71,10 +73,22 @@ def examined_by(checkout: Path, plant_file: dict[str, Any], records: tuple[Recor
 
 @click.command()
 @click.argument("rows_file", type=click.Path(path_type=Path, exists=True))
-@click.argument("checkout", type=click.Path(path_type=Path, exists=True, file_okay=False))
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="file of the rows")
-def main(rows_file: Path, checkout: Path, out: Path) -> None:
-    """Give the trials of ROWS_FILE to the commit in CHECKOUT, a clone with its own environment (`make env`)."""
+@click.option(
+    "--checkout",
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    help="clone of the other commit, with its own environment (make env)",
+)
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="file of its rows")
+@click.option("--into", type=click.Path(path_type=Path, exists=True), help="put the table into this page's block")
+def main(rows_file: Path, checkout: Path | None, out: Path, into: Path | None) -> None:
+    """Give the trials of ROWS_FILE to another commit, and print what both say of them."""
+    if checkout is not None:
+        run(rows_file, checkout, out)
+    click.echo(render(rows_file, out, into))
+
+
+def run(rows_file: Path, checkout: Path, out: Path) -> None:
+    """Give the other commit the trials that are missing, one line each."""
     commit = frozen.commit(checkout)
     done = {(row["stratum"], row["number"]) for row in frozen.read_rows(out)}
     for row in frozen.read_rows(rows_file):
@@ -88,9 +102,17 @@ def main(rows_file: Path, checkout: Path, out: Path) -> None:
         own |= {**found, "cpu_s": _children_s() - begun}
         with out.open("a", encoding="utf-8") as file:
             file.write(json.dumps(own) + "\n")
-        click.echo(
-            f"{row['stratum']} {row['number']} ({own['case']}): {own['outcome']} {own.get('named', own.get('said'))}"
-        )
+        answer = f"{own['outcome']} {own.get('named', own.get('said'))}"
+        click.echo(f"{row['stratum']} {row['number']} ({own['case']}): {answer}", err=True)
+
+
+def render(rows_file: Path, out: Path, page: Path | None) -> str:
+    """Both commits beside each other; put into the page's block of these files where one is given."""
+    text = beside(frozen.read_rows(rows_file), frozen.read_rows(out))
+    if page is not None:
+        block = f"{rows_file.name} beside {out.name}"
+        page.write_text(frozen.with_table(page.read_text(encoding="utf-8"), block, text), encoding="utf-8")
+    return text
 
 
 def _children_s() -> float:

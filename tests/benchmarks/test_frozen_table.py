@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from benchmarks import frozen, frozen_table
+from benchmarks import frozen, frozen_table, other_commit
 
 HEAD = "a" * 40
 ROOT = frozen.ROOT
 PAGE = ROOT / "docs" / "discrepancy-trials.md"
-BLOCK = re.compile(r"<!-- frozen (\S+) -->\n(.*?)\n<!-- end -->", re.S)
+BLOCK = re.compile(r"<!-- frozen (.+?) -->\n(.*?)\n<!-- end -->", re.S)
 
 
 def row(number=0, **changed):
@@ -151,4 +151,16 @@ def test_the_page_shows_the_tables_of_the_rows_that_are_kept():
     blocks = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
     assert blocks
     for name, text in blocks:
-        assert text == frozen.render(ROOT / "benchmarks" / "trials" / name, None)
+        first, *other = (ROOT / "benchmarks" / "trials" / file for file in name.split(" beside "))
+        assert text == (other_commit.render(first, *other, None) if other else frozen.render(first, None))
+
+
+def test_two_commits_stand_beside_each_other_on_the_trials_that_both_have():
+    new = [row(number=n, seed=n) for n in range(3)]
+    old = [row(number=n, seed=n, commit="b" * 40, outcome="missed" if n else "right") for n in (0, 1, 5)]
+    text = frozen_table.beside(new, old)
+    assert text.startswith("The 2 trials that")
+    _, before, now = cells(text, "named, or in a set that holds the truth")
+    assert (before.split(" (")[0], now.split(" (")[0]) == ("1 of 2", "2 of 2")
+    with pytest.raises(frozen_table.MixedCommitsError):
+        frozen_table.beside(new, [*old, {**old[0], "commit": "c" * 40}])

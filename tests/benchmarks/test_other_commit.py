@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from benchmarks import frozen, other_commit, strata, strata_axis
 from ema.models import actuator_file
 
-ROW = {"commit": "a" * 40, "stratum": "one effect", "number": 0, "seed": 3}
+ROW = {"commit": "a" * 40, "outcome": "refused", "stratum": "one effect", "number": 0, "seed": 3}
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def test_what_the_other_commit_says_stands_beside_what_was_hidden(tmp_path, chec
     rows, out = tmp_path / "rows.jsonl", tmp_path / "out.jsonl"
     rows.write_text(json.dumps(ROW) + "\n", encoding="utf-8")
     for _ in range(2):  # what is there is not done again
-        told = CliRunner().invoke(other_commit.main, [str(rows), str(checkout), "--out", str(out)])
+        told = CliRunner().invoke(other_commit.main, [str(rows), "--checkout", str(checkout), "--out", str(out)])
         assert told.exit_code == 0, told.output
     (row,) = frozen.read_rows(out)
     truth = strata_axis.drawn("one effect", 0, 3)
@@ -68,7 +68,7 @@ def test_no_answer_is_a_refusal_where_it_says_so_and_else_a_crash(tmp_path, chec
     command.write_text(f"#!/bin/sh\necho 'no such plant' >&2\nexit {status}\n", encoding="utf-8")
     rows, out = tmp_path / "rows.jsonl", tmp_path / "out.jsonl"
     rows.write_text(json.dumps(ROW) + "\n", encoding="utf-8")
-    CliRunner().invoke(other_commit.main, [str(rows), str(checkout), "--out", str(out)])
+    CliRunner().invoke(other_commit.main, [str(rows), "--checkout", str(checkout), "--out", str(out)])
     (row,) = frozen.read_rows(out)
     assert row["outcome"] == outcome
     assert row["said"] == ["no such plant"]
