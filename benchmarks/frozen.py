@@ -37,6 +37,11 @@ def seed(commit: str, stratum: str, trial: int) -> int:
     return int.from_bytes(digest[:4], "big")
 
 
+def bench_seed(s: int) -> int:
+    """The seed of the noise on a trial's bench."""
+    return s % BENCHES
+
+
 def _git(of: Path, *words: str) -> str:
     return subprocess.run(["git", *words], cwd=of, check=True, capture_output=True, text=True).stdout.strip()
 
@@ -130,7 +135,7 @@ def _trial(stratum: str, number: int, s: int, threads: int) -> dict[str, Any]:
     from benchmarks.discrepancy import examined
 
     t = strata.drawn(stratum, number, s)
-    bench = (t.n_cycles, s % BENCHES, t.motions, t.bench, threads, t.spoil)
+    bench = (t.n_cycles, bench_seed(s), t.motions, t.bench, threads, t.spoil)
     return {**t.told, **examined(t.actuator, t.case, t.values, t.k, *bench)}
 
 

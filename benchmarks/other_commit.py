@@ -39,16 +39,11 @@ def as_given(row: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any], tuple
         t = strata_axis.drawn(*of)
         return t.told, t.plant_file, t.records, lambda said: frozen_axis.beside_truth(t, said)
     a = strata.drawn(*of)
-    bench = (a.n_cycles, a_seed(row), a.motions, a.bench)
+    bench = (a.n_cycles, frozen.bench_seed(row["seed"]), a.motions, a.bench)
     record = discrepancy.recorded(a.values, a.k, *bench, a.spoil)
     told = {**a.told, "hidden": a.values, "k": a.k}
     file = {"kind": "ema", **a.actuator.model_dump(mode="json", exclude_defaults=True, by_alias=True)}
     return told, file, (record,), lambda said: discrepancy.beside_truth(a.case, a.values, a.k, *bench, said)
-
-
-def a_seed(row: dict[str, Any]) -> int:
-    """The seed of a bench's noise, as `benchmarks.frozen` takes it."""
-    return int(row["seed"]) % frozen.BENCHES
 
 
 def examined_by(checkout: Path, plant_file: dict[str, Any], records: tuple[Record, ...]) -> dict[str, Any]:

@@ -13,6 +13,8 @@ import numpy as np
 from numba import njit
 
 from ema.core.records import Cycle, Record
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.models.axis_config import RotaryAxis
 
 FINE = 50
 
@@ -117,3 +119,10 @@ def plant(axis: Axis, **more: object) -> dict[str, object]:
         "kind": "axis", "drive": "current", "J": axis.J, "F_d": 0.9 * axis.F, "C": 0.9 * axis.C, "k_t": axis.k_t,
         "fitted": ["J", "C"], **more,
     }  # fmt: skip
+
+
+def held(axis: Axis) -> AxisPlant:
+    """Eight seconds of it as the finder has them, the drive held between samples."""
+    found = AxisPlant(RotaryAxis.model_validate(plant(axis)), [record(axis, 1, seconds=8.0)], n_threads=1)
+    found.between = "held"
+    return found

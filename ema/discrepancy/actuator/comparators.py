@@ -32,7 +32,7 @@ def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]
     left = {step: excess_at(plant, noise, point, cycles, (step,)) for step in _steps(plant, COARSELY)}
     if min(left.values()) > now - FELT:  # what a step makes of a record grows with it, and evenly
         return None
-    left |= {step: excess_at(plant, noise, point, cycles, (step,)) for step in _steps(plant, TRIED)}
+    left |= {step: excess_at(plant, noise, point, cycles, (step,)) for step in _steps(plant, TRIED) if step not in left}
     best = max(step for step, x in left.items() if x < min(left.values()) + FELT)  # the coarser, the cheaper
     return best if left[best] < min(share * now, now - FELT) else None
 

@@ -110,10 +110,8 @@ def _function(of: Array, r: Array) -> tuple[Array, Array, float]:
     return middle, mean, 1.0 - float(((r - mean[part]) ** 2).sum()) / float(r @ r)
 
 
-def said_of_error(found: dict[str, Any] | None) -> list[str]:
-    """One sentence, where what is left of the currents is a function of the position error."""
-    if found is None:
-        return []
+def said_of_error(found: dict[str, Any]) -> list[str]:
+    """One sentence on what `of_error` found."""
     current = found["current"]
     return [
         f"the controller asks for other currents than the plant file's, between {min(current):+.2g} and "

@@ -6,9 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.axis.screened import screened
-from ema.models.axis_config import RotaryAxis
 
 MOTOR, LOAD = "quadratic_load_friction", "quadratic_output_load_friction"
 
@@ -17,10 +15,7 @@ MOTOR, LOAD = "quadratic_load_friction", "quadratic_output_load_friction"
 def plant(support):
     """Eight seconds, in which friction by the square of the motor's torque is not told from that by the load's too."""
     geared = support("geared")
-    axis = geared.Axis(by_square=2.5)
-    found = AxisPlant(RotaryAxis.model_validate(geared.plant(axis)), [geared.record(axis, 1, seconds=8.0)], n_threads=1)
-    found.between = "held"
-    return found
+    return geared.held(geared.Axis(by_square=2.5))
 
 
 def tried(plant, balance, point=()):

@@ -6,17 +6,12 @@ import pytest
 
 from ema.discrepancy.axis import witness
 from ema.discrepancy.axis.agreeing import together
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.models.axis_config import RotaryAxis
 
 
 @pytest.fixture(scope="module")
 def plant(support):
     geared = support("geared")
-    axis = geared.Axis(dry_slope=0.04)
-    found = AxisPlant(RotaryAxis.model_validate(geared.plant(axis)), [geared.record(axis, 1, seconds=8.0)], n_threads=1)
-    found.between = "held"
-    return found
+    return geared.held(geared.Axis(dry_slope=0.04))
 
 
 def plain(plant):
