@@ -25,7 +25,7 @@ from ema.core.errors import RecordError
 from ema.core.names import FAULTS
 from ema.core.records import Cycle, Record
 from ema.core.version import version
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
 from ema.models.actuator import Actuator
 
@@ -51,7 +51,7 @@ def examined(
     begun = time.process_time()
     told = {"hidden": values, "k": k}
     try:
-        data = measured(plant, [record])
+        data = prepare(plant, [record])
     except RecordError as error:
         return {**told, "outcome": "refused", "said": [str(error)]}
     examination = examine(plant, data, n_threads=n_threads)

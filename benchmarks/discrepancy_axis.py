@@ -20,7 +20,7 @@ import numpy as np
 from scipy import stats
 
 from ema.core.version import version
-from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.between import examine_ways
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
@@ -37,7 +37,7 @@ def look(names, seed):
     record = axis_bench.record(bench, rng, motions=motions)
     plant = AxisPlant(RotaryAxis.model_validate(plant_file), [record], n_threads=1)
     begun = time.process_time()
-    o = examined(plant)
+    o = examine_ways(plant)
     return {
         "code": version(),
         "cpu_s": round(time.process_time() - begun, 1),

@@ -22,7 +22,7 @@ from ema.bundle import Bundle
 from ema.core import config, resources
 from ema.core.records import Cycle, Record
 from ema.core.status import Reason
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
 from ema.discrepancy.extended import write_extended
 from ema.models.actuator import Actuator
@@ -93,7 +93,7 @@ def _extended(flaws: dict[str, float]) -> Bundle:
     plant_file = resources.config("actuator.yaml")
     record = Record(tuple(Cycle(n, c) for n, c in enumerate(flight(SEED + 100, N_FOUND, **flaws, k1=K1))))
     plant = config.load(plant_file, Actuator)
-    findings = examine(plant, measured(plant, [record])).findings
+    findings = examine(plant, prepare(plant, [record])).findings
     with TemporaryDirectory() as folder:
         write_extended(plant_file, findings.effects, Path(folder) / "extended.yaml")
         return quick_bundle(config.load(Path(folder) / "extended.yaml", Actuator))

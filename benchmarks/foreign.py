@@ -20,7 +20,7 @@ from benchmarks.frozen import commit
 from benchmarks.kernel import costs
 from ema.core import config, resources
 from ema.core.records import Record, read_record
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
 from ema.discrepancy.progress import Progress
 from ema.models.actuator import Actuator
@@ -47,7 +47,7 @@ def examined(name: str, n_threads: int) -> dict[str, Any]:
     begun = time.process_time()
     examination = examine(
         plant,
-        measured(plant, [record(name)]),
+        prepare(plant, [record(name)]),
         n_threads=n_threads,
         say=Progress(lambda t: click.echo(f"  {t}", err=True)),
     )

@@ -13,7 +13,7 @@ import click
 
 from benchmarks import frozen, strata_axis
 from ema.core.errors import RecordError
-from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.between import examine_ways
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.axis.wording import findings
 from ema.models.axis_config import LinearAxis, RotaryAxis
@@ -36,7 +36,7 @@ def trial(t: strata_axis.Trial, threads: int) -> dict[str, Any]:
     begun = time.process_time()
     try:
         plant = AxisPlant(model.model_validate(t.plant_file), t.records, n_threads=threads)
-        found = findings(plant, examined(plant))
+        found = findings(plant, examine_ways(plant))
     except RecordError as error:
         return {**told, "outcome": "refused", "said": [str(error)]}
     except Exception as error:  # a defect: it counts against the finder, and the run goes on

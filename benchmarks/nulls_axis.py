@@ -22,7 +22,7 @@ from scipy import stats
 from benchmarks import resumed
 from ema.core.records import Record
 from ema.core.version import version
-from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.between import examine_ways
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.axis.wording import findings
 from ema.models.axis_config import LinearAxis, RotaryAxis
@@ -75,7 +75,7 @@ def look(seed: int, number: int) -> dict[str, Any]:
     plant, record = PLANTS[name](np.random.default_rng([seed, number]), number)
     begun = time.process_time()
     whole = AxisPlant(plant, [record], n_threads=1)
-    found = findings(whole, examined(whole))
+    found = findings(whole, examine_ways(whole))
     return {
         "code": version(),
         "seed": seed,

@@ -56,13 +56,13 @@ def discrepancy(
       ema discrepancy --out findings --explain magnet_flux
     """
     from ema.core import config
-    from ema.discrepancy.explaining import read_findings, why
+    from ema.discrepancy.explaining import explain_cause, read_findings
 
     from .integrity import tell
     from .plans import plan_of
 
     if explain is not None and not records:
-        click.echo(why(read_findings(out), explain))
+        click.echo(explain_cause(read_findings(out), explain))
         return
     if not records or plant_file is None:
         raise click.UsageError("RECORD... and --plant are needed, but with --explain of findings that are there.")
@@ -93,7 +93,7 @@ def discrepancy(
         for note in findings.notes:
             click.echo(f"- {note}")
         if explain is not None:
-            click.echo(why(findings.as_dict(), explain))
+            click.echo(explain_cause(findings.as_dict(), explain))
         click.echo(f"{files[1]}")
     if findings.verdict == "unfinished":
         raise click.Abort

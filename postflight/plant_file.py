@@ -12,7 +12,7 @@ from ema.discrepancy.records import begin
 
 def axis_file(records: Sequence[Record], sheet: begin.Sheet, name: str) -> str:
     """Of an axis; RecordError where the records hold no motion or no drive."""
-    known = begin.axis(records, sheet)
+    known = begin.begin_axis(records, sheet)
     lines = _head(records)
     lines += [f"name: {name}"]
     for one in known:
@@ -49,4 +49,4 @@ def actuator_file(records: Sequence[Record], sheet: begin.Sheet, name: str) -> s
 
 def _head(records: Sequence[Record]) -> list[str]:
     files = ", ".join(record.name for record in records)
-    return [f"# Begun by 'ema plant init' from {files}", f"# with the channels {begin.channels_said(records)}."]
+    return [f"# Begun by 'ema plant init' from {files}", f"# with the channels {begin.describe_channels(records)}."]

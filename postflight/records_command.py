@@ -45,7 +45,7 @@ def check(files: tuple[Path, ...], plant: Path | None, picture: Path | None, as_
     from ema.core.errors import ConfigError, NegativeAnswer
     from ema.core.files import require_new
     from ema.core.records import each_once, read_record
-    from ema.discrepancy.records import agreements, allowed, channels, sampling
+    from ema.discrepancy.records import agreements, channels, list_allowed, sampling
 
     from .plans import plan_of
 
@@ -56,7 +56,7 @@ def check(files: tuple[Path, ...], plant: Path | None, picture: Path | None, as_
     for path in each_once(files):
         record = read_record(path, plan)
         clock, facts, agree = sampling(record), channels(record), agreements(record)
-        able = allowed(record, clock, facts, agree)
+        able = list_allowed(record, clock, facts, agree)
         found.append(record)
         answers.append((record, clock, facts, agree, able))
     if as_json:

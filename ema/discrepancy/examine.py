@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from .fitting import Fit, fit, jacobian
-from .grade import Left, graded
+from .grade import Left, grade
 from .held_out import by_record, over_folds, residual_over_folds, training_gain
 from .outcome import Gain, Outcome
 from .plant import Plant
 from .progress import Progress
-from .rounds import Reread, State, judged, leave_out, never, revise, select, without_terms
-from .selection import FORM, above_noise, alike, base_model, compare, is_nameless
-from .trust import told_effects, without_unlikely
+from .rounds import Reread, State, judge_model, leave_out, never, revise, select, try_library_alone
+from .selection import FORM, above_noise, compare, find_alike, fit_base, is_nameless
+from .trust import describe_effects, drop_unlikely
 
 MIMICKED = 0.02  # of an effect's mark in power, where less is left of it beside the base parameters it cannot be seen
 
@@ -24,16 +24,16 @@ def examine(plant: Plant, progress: Progress | None = None, reread: Reread | Non
     progress = progress or Progress()
     everything = list(range(len(plant.blocks)))
     progress("nominal model")
-    plain = base_model(plant)
+    plain = fit_base(plant)
     progress.fitted((), plain.rms, plain.fits[0].point)
     state = State(plain, plain, [], [], reread=reread or never)
     notes: list[str] = []
     select(plant, state, progress)
     revise(plant, state, progress)
-    state = without_terms(plant, state, progress)
-    trust = without_unlikely(plant, state, progress)
+    state = try_library_alone(plant, state, progress)
+    trust = drop_unlikely(plant, state, progress)
     plain = state.plain
-    verdict = judged(plant, plain)
+    verdict = judge_model(plant, plain)
     left = _without_small_terms(plant, state)
     progress("final fit")
     chosen = list(state.model.accepted)  # where folds suggested different parameters, those of the first fold
@@ -41,7 +41,7 @@ def examine(plant: Plant, progress: Progress | None = None, reread: Reread | Non
     final = fit(plant, free, state.model.fits[0].point, everything)
     before = fit(plant, plant.base, plain.fits[0].point, everything)
     terms = [c for c in chosen if c.is_structure]
-    outcome = graded(left, named=len(terms) < len(chosen))
+    outcome = grade(left, named=len(terms) < len(chosen))
     if outcome == "adequate" and not left.is_chance:
         notes.append(
             f"{left.sentence} ({verdict.because}, p = {verdict.p_value:.1g}), and no effect and no term foretells "
@@ -51,14 +51,14 @@ def examine(plant: Plant, progress: Progress | None = None, reread: Reread | Non
     if state.immaterial and outcome in ("adequate", "explained"):
         notes.append(f"{state.immaterial}: too little for a cause")
     # with terms that have no name, more is told than the verdict asked for
-    is_chance = judged(plant, state.model).is_noise if terms else left.is_chance
+    is_chance = judge_model(plant, state.model).is_noise if terms else left.is_chance
     folds = over_folds(plant, plain, state.model) if terms else left.error
     names = [f.name for f in plant.base]
     return Outcome(
         verdict=outcome,
         because=verdict.because,
         p_value=verdict.p_value,
-        effects=told_effects(plant, state, trust, final.point, final.draw),
+        effects=describe_effects(plant, state, trust, final.point, final.draw),
         structure=plant.describe_structure(terms, final.point) if terms or outcome == "unexplained" else {},
         train=training_gain(plant, plain, state.model),
         heldout=Gain(folds.err_before, folds.err_after, folds.noise_floor),
@@ -83,7 +83,7 @@ def _lost(state: State) -> list[dict[str, Any]]:
     rows: dict[str, dict[str, Any]] = {}
     for own, (trials, before) in zip(state.model.accepted, state.rounds, strict=True):
         scale = min(t.scale for t in trials.values())
-        told = {own.key, *alike(trials, own.key, before), *(c.key for c in state.model.accepted)}
+        told = {own.key, *find_alike(trials, own.key, before), *(c.key for c in state.model.accepted)}
         for key, trial in trials.items():
             if key in told or is_nameless(key, trial) or not compare(trial, before, scale).is_significant:
                 continue
@@ -104,13 +104,13 @@ def _without_small_terms(plant: Plant, state: State) -> Left:
     terms = {k for k, c in enumerate(state.model.accepted) if c.is_structure}
     named = leave_out(plant, state.model, terms) if terms else state.model
     left = Left(
-        judged(plant, named).is_noise,
+        judge_model(plant, named).is_noise,
         over_folds(plant, state.plain, named),
         residual_over_folds(plant, state.plain, named),
         above_noise(named) < FORM**2 * above_noise(state.plain),
         plant.noise_uncertainty,
     )
-    if terms and graded(left, named=bool(named.accepted)) in ("adequate", "explained"):
+    if terms and grade(left, named=bool(named.accepted)) in ("adequate", "explained"):
         keys = " and ".join(state.model.accepted[k].key for k in sorted(terms))
         mark = above_noise(named) - above_noise(state.model)
         state.immaterial = f"{keys} would take {mark:.1%} of the noise's mean square from it"

@@ -25,7 +25,7 @@ def read_findings(folder: Path) -> dict[str, Any]:
     return found
 
 
-def why(findings: Mapping[str, Any], cause: str) -> str:
+def explain_cause(findings: Mapping[str, Any], cause: str) -> str:
     """One sentence on a cause: named, one of a set, rejected with what it leaves, or not fitted at all.
 
     ConfigError where no effect of that name exists.

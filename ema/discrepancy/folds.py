@@ -123,7 +123,7 @@ def _rms(squares: Array, weight: Array) -> float:
     return float(np.sqrt(squares @ weight / weight.sum()))
 
 
-def dealt(order: Sequence[int], n_at_most: int) -> list[list[int]]:
+def deal(order: Sequence[int], n_at_most: int) -> list[list[int]]:
     """Parts in at most so many groups, dealt like cards, so that neighbours come into different ones."""
     n = min(n_at_most, len(order))
     return [list(order[first::n]) for first in range(n)]

@@ -83,7 +83,7 @@ class Left:
         )
 
 
-def graded(left: Left, *, named: bool) -> Verdict:
+def grade(left: Left, *, named: bool) -> Verdict:
     """The verdict on what `left` says, with causes `named` or without any."""
     if not named:
         return "adequate" if left.is_chance or not left.is_sure else "unexplained"

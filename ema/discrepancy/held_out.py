@@ -9,14 +9,14 @@ import numpy as np
 from .folds import Folds
 from .outcome import Gain, RecordGain
 from .plant import Errors, Fitted, Plant
-from .selection import Tried, training
+from .selection import Tried, list_folds
 
 N_PARTS = 20  # at most, of all records together; neighbouring stretches of one record make one
 
 
 def training_gain(plant: Plant, plain: Tried, model: Tried) -> Gain:
     """Errors before and after on the parts that the fits have seen."""
-    blocks = [train for train, _ in training(plant)]
+    blocks = [train for train, _ in list_folds(plant)]
     before, after = (
         [plant.errors(f.point, own) for f, own in zip(t.fits, blocks, strict=True)] for t in (plain, model)
     )
@@ -62,7 +62,7 @@ def by_record(plant: Plant, plain: Tried, model: Tried) -> list[RecordGain]:
 def _errors(plant: Plant, model: Tried, blocks: set[int]) -> list[Errors]:
     """Of some blocks, by the fit of each fold that left some of them out."""
     found = []
-    for (_, left_out), fitted in zip(training(plant), model.fits, strict=True):
+    for (_, left_out), fitted in zip(list_folds(plant), model.fits, strict=True):
         if own := [j for j in left_out if j in blocks]:
             found.append(plant.errors(fitted.point, own, Fitted(fitted.free, fitted.by_noise)))
     return found

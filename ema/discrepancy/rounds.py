@@ -9,7 +9,7 @@ from typing import Any
 from .grade import LIMIT
 from .plant import Candidate, Plant, Point
 from .progress import Progress
-from .selection import FORM, Tried, above_noise, base_model, choice, compare, fit_model, is_worth_it, one_more
+from .selection import FORM, Tried, above_noise, choose, compare, fit_base, fit_model, fit_with_each, is_worth_it
 from .verdict import Verdict, judge
 
 MAX_EFFECTS = 3
@@ -54,10 +54,10 @@ def is_explained(plant: Plant, plain: Tried, model: Tried) -> bool:
         return True
     if above_noise(model) < FORM**2 * above_noise(plain):
         return True
-    return judged(plant, model).is_noise
+    return judge_model(plant, model).is_noise
 
 
-def judged(plant: Plant, model: Tried) -> Verdict:
+def judge_model(plant: Plant, model: Tried) -> Verdict:
     """Whether what a model leaves of held-out parts is noise."""
     n_free = sum(len(f.free) for f in model.fits)
     return judge(model.held_out, noise_uncertainty=plant.noise_uncertainty, n_free=n_free)
@@ -70,13 +70,13 @@ def select(plant: Plant, state: State, progress: Progress) -> None:
     gain was not the effect's own.
     """
     begun_anew_with = -1  # effects
-    while not judged(plant, state.model).is_noise:
+    while not judge_model(plant, state.model).is_noise:
         trials = _round(plant, state, state.model, progress)
-        best = choice(trials, state.model) if trials else None
+        best = choose(trials, state.model) if trials else None
         if best is None or not is_worth_it(trials[best], state.model):
             return
         if state.reread(state.model, trials[best]):
-            state.plain = state.model = base_model(plant)
+            state.plain = state.model = fit_base(plant)
             state.rounds.clear()
             begun_anew_with = -1
             continue
@@ -103,7 +103,7 @@ def select(plant: Plant, state: State, progress: Progress) -> None:
         state.model = trials[best]
 
 
-def without_terms(plant: Plant, state: State, progress: Progress) -> State:
+def try_library_alone(plant: Plant, state: State, progress: Progress) -> State:
     """Effects of the library alone, where they foretell held-out parts as well as with nameless terms.
 
     One term may do what two effects do: friction that knows directions beside a spring is a force along the travel.
@@ -137,7 +137,7 @@ def _round(
             everything += plant.structure(point, blocks)
         return [c for c in everything if only is None or c.key in only]
 
-    trials = one_more(plant, model, suggest, lambda key: progress(f"round {number}: {key}"))
+    trials = fit_with_each(plant, model, suggest, lambda key: progress(f"round {number}: {key}"))
     scale = min((t.scale for t in trials.values()), default=1.0)
     for key, trial in trials.items():
         gain = compare(trial, model, scale)
@@ -166,7 +166,7 @@ def revise(plant: Plant, state: State, progress: Progress) -> None:
         rivals = _strongest(state.rounds[k][0], state.rounds[k][1]) if many else None
         trials = _round(plant, state, reduced, progress, rivals)
         trials[own.key] = state.model
-        best = choice(trials, reduced) or own.key
+        best = choose(trials, reduced) or own.key
         if best != own.key and compare(trials[best], state.model).is_clear:
             model = trials[best]
             del state.rounds[k]
@@ -186,12 +186,12 @@ def leave_out(plant: Plant, model: Tried, out: set[int]) -> Tried:
     for fitted, m in zip(model.fits, model.models, strict=True):
         point = fitted.point
         for j in out:
-            point = _without(point, m[j], base)
+            point = _remove(point, m[j], base)
         starts.append([point])
     return fit_model(plant, models, starts)
 
 
-def _without(point: Point, candidate: Candidate, base: set[str]) -> Point:
+def _remove(point: Point, candidate: Candidate, base: set[str]) -> Point:
     """The point less what belongs to the candidate (a start may also propose base parameters: these stay)."""
     own = {f.name for f in candidate.free} | {name for start in candidate.starts for name in start}
     return {name: value for name, value in point.items() if name in base or name not in own}

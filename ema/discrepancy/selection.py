@@ -26,7 +26,7 @@ FORM = 0.17  # what the laws of the library are off by, relative: a Lorentzian f
 SAME_SHARE = 0.03  # explanations of a residual that none explains fully are alike within this share of the gain
 
 
-def folds(blocks: Sequence[Block]) -> list[list[int]]:
+def split_into_folds(blocks: Sequence[Block]) -> list[list[int]]:
     """Blocks of each fold: stretches of every record alternately, so that each fold sees every motion."""
     order: dict[str, dict[int, int]] = {}
     out: list[list[int]] = [[] for _ in range(N_FOLDS)]
@@ -91,10 +91,10 @@ def compare(one: Tried, other: Tried, scale: float | None = None) -> Comparison:
     return Comparison(float(d.sum()), error, scale, is_local)
 
 
-def training(plant: Plant) -> list[tuple[list[int], list[int]]]:
+def list_folds(plant: Plant) -> list[tuple[list[int], list[int]]]:
     """For each fold the blocks to fit on and those left out."""
     everything = range(len(plant.blocks))
-    return [([j for j in everything if j not in set(out)], out) for out in folds(plant.blocks)]
+    return [([j for j in everything if j not in set(out)], out) for out in split_into_folds(plant.blocks)]
 
 
 def fit_model(
@@ -105,11 +105,11 @@ def fit_model(
 ) -> Tried:
     """Fit one model (its candidates by fold) on all but one fold each; `starts` and `frozen` slopes by fold."""
     fits: list[Fit] = []
-    parts = training(plant)
+    parts = list_folds(plant)
     for (blocks, _), model, start, known in zip(parts, models, starts, frozen, strict=True):
         free = [*plant.base, *(f for c in model for f in c.free)]
         fits.append(best_fit(plant, free, start, blocks, frozen=known))
-    fits = [_helped(plant, own, fits) for own in fits]
+    fits = [_help_by_other_folds(plant, own, fits) for own in fits]
     held: dict[int, Array] = {}
     for (_, left_out), fitted in zip(parts, fits, strict=True):
         held.update(zip(left_out, plant.residuals([fitted.point], left_out)[0], strict=True))
@@ -117,7 +117,7 @@ def fit_model(
     return Tried(tuple(models[0]), tuple(fits), tuple(tuple(m) for m in models), ordered)
 
 
-def _helped(plant: Plant, own: Fit, fits: Sequence[Fit]) -> Fit:
+def _help_by_other_folds(plant: Plant, own: Fit, fits: Sequence[Fit]) -> Fit:
     """The fit, begun again where another fold ended if that is better here: dry friction has side minima."""
     names = [f.name for f in own.free]
     for other in fits:
@@ -131,13 +131,13 @@ def _helped(plant: Plant, own: Fit, fits: Sequence[Fit]) -> Fit:
     return own
 
 
-def base_model(plant: Plant) -> Tried:
+def fit_base(plant: Plant) -> Tried:
     """The plant as it is, with its base parameters fitted."""
     start = {f.name: f.start for f in plant.base}
     return fit_model(plant, [()] * N_FOLDS, [[start]] * N_FOLDS)
 
 
-def one_more(
+def fit_with_each(
     plant: Plant,
     model: Tried,
     suggest: Callable[[Point, Sequence[int]], Sequence[Candidate]],
@@ -145,7 +145,7 @@ def one_more(
 ) -> dict[str, Tried]:
     """The model with each suggested candidate added. A candidate must be suggested by every fold's training blocks."""
     suggested, frozen = [], []
-    for (train, _), fitted in zip(training(plant), model.fits, strict=True):
+    for (train, _), fitted in zip(list_folds(plant), model.fits, strict=True):
         suggested.append({c.key: c for c in suggest(fitted.point, train)})
         here = np.concatenate([r.ravel() for r in fitted.residuals])
         many = len(fitted.free) > FEW
@@ -162,13 +162,13 @@ def one_more(
         ]
         out[key] = fit_model(plant, models, starts, frozen)
     if any(known is not None for known in frozen):
-        for key in _leading(out, model):
+        for key in _find_leading(out, model):
             progress(f"{key}, all parameters")
-            out[key] = refitted(plant, out[key])
+            out[key] = refit(plant, out[key])
     return out
 
 
-def _leading(trials: dict[str, Tried], model: Tried) -> list[str]:
+def _find_leading(trials: dict[str, Tried], model: Tried) -> list[str]:
     """The few best candidates, between which the decision lies."""
     if not trials:
         return []
@@ -178,12 +178,12 @@ def _leading(trials: dict[str, Tried], model: Tried) -> list[str]:
     return [key for key in ranked if gains[key] > 0.5 * gains[ranked[0]]]
 
 
-def refitted(plant: Plant, tried: Tried) -> Tried:
+def refit(plant: Plant, tried: Tried) -> Tried:
     """The same model with all its parameters fitted together."""
     return fit_model(plant, tried.models, [[fitted.point] for fitted in tried.fits])
 
 
-def best_of(trials: dict[str, Tried], model: Tried) -> str:
+def find_best(trials: dict[str, Tried], model: Tried) -> str:
     """Key of the candidate under which held-out data are most likely."""
     scale = min(t.scale for t in trials.values())
     return max(trials, key=lambda key: compare(trials[key], model, scale).gain)
@@ -194,13 +194,13 @@ def is_nameless(key: str, trial: Tried) -> bool:
     return any(c.key == key and c.is_structure for c in trial.accepted)
 
 
-def choice(trials: dict[str, Tried], model: Tried) -> str | None:
+def choose(trials: dict[str, Tried], model: Tried) -> str | None:
     """Key of what to add: the best of the library, unless a nameless term foretells held-out data clearly better."""
     nameless = {key: t for key, t in trials.items() if is_nameless(key, t)}
     named = {key: t for key, t in trials.items() if key not in nameless}
     if not named or not nameless:
-        return best_of(trials, model) if trials else None
-    one, other = best_of(named, model), best_of(nameless, model)
+        return find_best(trials, model) if trials else None
+    one, other = find_best(named, model), find_best(nameless, model)
     lead = compare(trials[other], trials[one])
     if lead.is_clear and lead.gain > SAME_SHARE * compare(trials[other], model).gain:
         return other
@@ -209,7 +209,7 @@ def choice(trials: dict[str, Tried], model: Tried) -> str | None:
     return other
 
 
-def alike(trials: dict[str, Tried], best: str, model: Tried) -> list[str]:
+def find_alike(trials: dict[str, Tried], best: str, model: Tried) -> list[str]:
     """Candidates the data cannot tell from the best one."""
     top = trials[best]
     scale = min(t.scale for t in trials.values())

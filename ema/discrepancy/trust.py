@@ -11,11 +11,11 @@ from .fitting import WILD, Fit
 from .grade import NAMED
 from .plant import Array, Candidate, Free, Plant
 from .progress import Progress
-from .rounds import State, is_explained, judged, leave_out
-from .selection import FORM, Tried, above_noise, alike, best_of, compare, is_nameless
+from .rounds import State, is_explained, judge_model, leave_out
+from .selection import FORM, Tried, above_noise, compare, find_alike, find_best, is_nameless
 
 
-def without_unlikely(plant: Plant, state: State, progress: Progress) -> dict[str, float]:
+def drop_unlikely(plant: Plant, state: State, progress: Progress) -> dict[str, float]:
     """Leave out effects that are no causes: what they explain is a rest without a name. The trust in those that stay.
 
     These are the unlikeliest together with all that the data cannot tell from them, and, where much stays unexplained,
@@ -28,7 +28,7 @@ def without_unlikely(plant: Plant, state: State, progress: Progress) -> dict[str
         for k, (c, (trials, before)) in enumerate(zip(state.model.accepted, state.rounds, strict=True)):
             if not c.is_structure:
                 weights = _weights(trials, before)
-                told = {c.key, *(key for key in alike(trials, c.key, before) if key in weights)}
+                told = {c.key, *(key for key in find_alike(trials, c.key, before) if key in weights)}
                 no_cause = not explained and leans_in_a_fold(state.model, k)
                 odds[c.key] = 0.0 if no_cause else trust[c.key] * sum(weights[key] for key in told)
         worst = min(odds, key=lambda key: odds[key], default=None)
@@ -42,7 +42,9 @@ def without_unlikely(plant: Plant, state: State, progress: Progress) -> dict[str
         del state.rounds[k]
 
 
-def told_effects(plant: Plant, state: State, trust: dict[str, float], point: Any, draw: Any) -> list[dict[str, Any]]:
+def describe_effects(
+    plant: Plant, state: State, trust: dict[str, float], point: Any, draw: Any
+) -> list[dict[str, Any]]:
     """The model's effects for findings.json, each with what the data cannot tell from it."""
     accepted = state.model.accepted
     named = [c for c in accepted if not c.is_structure]
@@ -53,7 +55,7 @@ def told_effects(plant: Plant, state: State, trust: dict[str, float], point: Any
     for entry in plant.describe(named, point, draw):
         key = entry.pop("key")
         trials, before = rounds[key]
-        others = {o for o in alike(trials, key, before) if not is_nameless(o, trials[o])}
+        others = {o for o in find_alike(trials, key, before) if not is_nameless(o, trials[o])}
         others |= set(entry.pop("also", ()))
         confidence = _weights(trials, before)[key] * trust[key] / (1 + entry.pop("n_equal", 0))
         out.append(
@@ -95,7 +97,7 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
     if len(terms) == len(accepted):
         return {}
     nameless = leave_out(plant, state.model, terms) if terms else state.model
-    unknown = 0.0 if judged(plant, nameless).is_noise else above_noise(nameless)
+    unknown = 0.0 if judge_model(plant, nameless).is_noise else above_noise(nameless)
     befores = {c.key: of[1] for c, of in zip(accepted, state.rounds, strict=True) if not c.is_structure}
     marks = {key: max(above_noise(before) - above_noise(state.model), 0.0) for key, before in befores.items()}
     made = {key: _differences(before, state.model) for key, before in befores.items()}
@@ -137,7 +139,7 @@ def _weights(trials: dict[str, Tried], before: Tried) -> dict[str, float]:
     """Share of each effect in the likelihood of held-out data; gains count no more than their error allows."""
     trials = {key: t for key, t in trials.items() if not is_nameless(key, t)}
     scale = min(t.scale for t in trials.values())
-    best = best_of(trials, before)
+    best = find_best(trials, before)
     logs = {}
     for key, trial in trials.items():
         lead = compare(trials[best], trial, scale)

@@ -7,7 +7,7 @@ import pytest
 
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 
 
 @pytest.fixture(scope="module")
@@ -24,36 +24,36 @@ def changed(good: dict[str, np.ndarray], **new: np.ndarray) -> dict[str, np.ndar
 
 
 def test_good_record_is_accepted(good, shipped_plant):
-    assert measured(shipped_plant, [record(good)]).n_cycles == 1
+    assert prepare(shipped_plant, [record(good)]).n_cycles == 1
 
 
 @pytest.mark.parametrize("name", ["i_b", "theta_m", "theta_u", "theta_cmd"])
 def test_missing_channel(good, shipped_plant, name):
     without = {key: x for key, x in good.items() if key != name}
     with pytest.raises(RecordError, match=f"missing channel {name}"):
-        measured(shipped_plant, [record(without)])
+        prepare(shipped_plant, [record(without)])
 
 
 def test_too_short(good, shipped_plant):
     with pytest.raises(RecordError, match="at least 2000"):
-        measured(shipped_plant, [record({name: x[:900] for name, x in good.items()})])
+        prepare(shipped_plant, [record({name: x[:900] for name, x in good.items()})])
 
 
 @pytest.mark.parametrize("name", ["i_a", "theta_m", "theta_cmd"])
 def test_constant(good, shipped_plant, name):
     with pytest.raises(RecordError, match=f"{name}.*constant|constant.*{name}"):
-        measured(shipped_plant, [record(changed(good, **{name: np.zeros(len(good["t"]))}))])
+        prepare(shipped_plant, [record(changed(good, **{name: np.zeros(len(good["t"]))}))])
 
 
 def test_clipped(good, shipped_plant):
     with pytest.raises(RecordError, match=r"i_a is clipped at 1 A"):
-        measured(shipped_plant, [record(changed(good, i_a=np.clip(good["i_a"], -1.0, 1.0)))])
+        prepare(shipped_plant, [record(changed(good, i_a=np.clip(good["i_a"], -1.0, 1.0)))])
 
 
 def test_desynchronised(good, shipped_plant):
     late = {name: np.roll(good[name], 200) for name in ("i_a", "i_b", "i_c")}
     with pytest.raises(RecordError, match="not synchronised"):
-        measured(shipped_plant, [record(changed(good, **late))])
+        prepare(shipped_plant, [record(changed(good, **late))])
 
 
 @pytest.mark.parametrize("factor", [0.5, 0.8, 1.25, 3.0])
@@ -61,23 +61,23 @@ def test_other_gains_of_the_controller_are_no_lack_of_synchrony(good, shipped_pl
     """Wrong gains turn the phase of what the controller should ask for; that is something to find, not to refuse."""
     control = shipped_plant.control.model_copy(update={"K_p": factor * shipped_plant.control.K_p})
     other = shipped_plant.model_copy(update={"control": control})
-    measured(other, [record(good)])
+    prepare(other, [record(good)])
     late = {name: np.roll(good[name], 200) for name in ("i_a", "i_b", "i_c")}
     with pytest.raises(RecordError, match="not synchronised"):
-        measured(other, [record(changed(good, **late))])
+        prepare(other, [record(changed(good, **late))])
 
 
 def test_another_plant(good, shipped_plant):
     with pytest.raises(RecordError, match="another plant"):
-        measured(shipped_plant, [record(changed(good, theta_m=0.2 * good["theta_m"]))])
+        prepare(shipped_plant, [record(changed(good, theta_m=0.2 * good["theta_m"]))])
 
 
 def test_wrong_sampling(good, shipped_plant):
     with pytest.raises(RecordError, match="sampled at 5000 Hz"):
-        measured(shipped_plant, [record(changed(good, t=2.0 * good["t"]))])
+        prepare(shipped_plant, [record(changed(good, t=2.0 * good["t"]))])
 
 
 def test_gap(good, shipped_plant):
     keep = np.r_[0:2000, 2100:5001]
     with pytest.raises(RecordError, match="gap"):
-        measured(shipped_plant, [record({name: x[keep] for name, x in good.items()})])
+        prepare(shipped_plant, [record({name: x[keep] for name, x in good.items()})])

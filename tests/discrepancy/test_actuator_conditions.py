@@ -10,13 +10,13 @@ from scipy.ndimage import uniform_filter1d
 
 from ema.core import config, resources
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.conditions import as_recorded, current_noise, position_noise, supply_voltage
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.conditions import current_noise, position_noise, supply_voltage, take_recorded_conditions
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
 from ema.discrepancy.actuator.fit import excess_at
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import CARRIED, EmaPlant
-from ema.discrepancy.actuator.play import pressed
+from ema.discrepancy.actuator.play import find_pressing_load
 from ema.discrepancy.actuator.zeros import zero_apart
 from ema.discrepancy.extended import write_extended
 from ema.models.actuator import Actuator
@@ -31,11 +31,11 @@ def cycles(hidden):
 def prepared(plant, cycles, **changes):
     """The record's signals, channels changed by functions of the channel."""
     altered = [{**c, **{name: change(c[name]) for name, change in changes.items()}} for c in cycles]
-    return measured(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(altered)))])
+    return prepare(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(altered)))])
 
 
 def test_a_record_of_the_plant_changes_nothing(cycles, shipped_plant):
-    plant, notes = as_recorded(shipped_plant, prepared(shipped_plant, cycles).signals)
+    plant, notes = take_recorded_conditions(shipped_plant, prepared(shipped_plant, cycles).signals)
     assert plant == shipped_plant
     assert notes == []
 
@@ -46,7 +46,7 @@ def test_noise_of_the_current_sensors_is_read_from_their_sum(cycles, shipped_pla
     noisy = {f"i_{j}": lambda x: x + sd * rng.standard_normal(len(x)) for j in "abc"}
     signals = prepared(shipped_plant, cycles, **noisy).signals
     assert current_noise(shipped_plant, signals) == pytest.approx(np.hypot(sd, 5e-3), rel=0.05)
-    assert "sensors.current_noise" in as_recorded(shipped_plant, signals)[1][0]
+    assert "sensors.current_noise" in take_recorded_conditions(shipped_plant, signals)[1][0]
 
 
 def test_noise_of_the_position_is_read_below_and_above_the_step_of_its_converter(hidden, shipped_plant):
@@ -70,7 +70,7 @@ def test_a_position_without_steps_says_nothing_of_the_noise_before_the_converter
 def test_the_supply_is_its_voltage_without_load(cycles, shipped_plant):
     assert supply_voltage(shipped_plant, prepared(shipped_plant, cycles).signals) == pytest.approx(48.0, abs=0.02)
     lower = prepared(shipped_plant, cycles, u_dc=lambda x: x - 1.0).signals
-    plant, notes = as_recorded(shipped_plant, lower)
+    plant, notes = take_recorded_conditions(shipped_plant, lower)
     assert plant.inverter.V_dc == pytest.approx(47.0, abs=0.02)
     assert "47 V in the records, 48 V in the plant file" in notes[0]
 
@@ -135,7 +135,7 @@ def test_comparators_ten_times_as_coarse_are_a_condition_and_no_cause(hidden, sh
     bench = hidden.Bench(substeps=10)
     cycles = hidden.cycles(hidden.Flaws(**flaws), 3, 4, (hidden.chirp(),), bench)
     record = Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))
-    findings = examine(shipped_plant, measured(shipped_plant, [record])).findings
+    findings = examine(shipped_plant, prepare(shipped_plant, [record])).findings
     assert [e.name for e in findings.effects] == ["viscous_drag"] * ("viscous" in flaws)
     assert findings.verdict == ("explained" if findings.effects else "adequate")
     assert any("evaluated every 10 µs" in note for note in findings.notes)
@@ -145,7 +145,7 @@ def test_comparators_ten_times_as_coarse_are_a_condition_and_no_cause(hidden, sh
 def examined(hidden, plant, bench, **flaws):
     """Findings on four cycles of two motions."""
     cycles = hidden.cycles(hidden.Flaws(**flaws), 4, 6, bench=bench)
-    return examine(plant, measured(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])).findings
+    return examine(plant, prepare(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])).findings
 
 
 @pytest.mark.parametrize(("k2", "noise"), [(0.0, 4e-6), (0.2, 4e-6), (0.0, 4e-5)])
@@ -222,17 +222,17 @@ def test_late_comparators_that_went_on_switching_at_rest_do_so_in_the_simulation
     motions, bench = hidden.drawn_motions(rng), hidden.drawn_bench(rng)
     flaws = hidden.Flaws(reaction=2.91e-6, k5=0.0225, k6=0.0209)
     cycles = hidden.cycles(flaws, 4, 27, motions, bench)[2:]
-    data = measured(shipped_plant, [Record(tuple(Cycle(number, c) for number, c in enumerate(cycles)))])
+    data = prepare(shipped_plant, [Record(tuple(Cycle(number, c) for number, c in enumerate(cycles)))])
     assert np.abs(data.holding[1]).max() > 0.1
     truth = {"comparator_delay.time": 2.91e-6, "k5": 0.0225, "k6": 0.0209}
-    plant = EmaPlant(as_recorded(shipped_plant, data.signals)[0], data)
+    plant = EmaPlant(take_recorded_conditions(shipped_plant, data.signals)[0], data)
     assert excess_at(plant, Noise(plant, truth), truth, [1]) < 1.0
 
 
 def test_what_sensors_show_too_much_is_no_current_that_comparators_switch_at_rest(hidden, shipped_plant):
     """Late comparators had been begun as switching where offsets alone were recorded: a misfit that was no cause's."""
     (cycle,) = hidden.cycles(hidden.Flaws(recorder_offset_a=0.1, offset_c=0.12), 1, 3)
-    data = measured(shipped_plant, [Record((Cycle(0, cycle), Cycle(1, cycle)))])
+    data = prepare(shipped_plant, [Record((Cycle(0, cycle), Cycle(1, cycle)))])
     plant = EmaPlant(shipped_plant, data)
     assert np.abs(data.holding).max() > CARRIED
     shown = {"recorder_offset.offset_a": 0.1, "current_offset.offset_c": 0.12, "comparator_delay.time": 2e-6}
@@ -258,7 +258,7 @@ def test_what_sensors_show_too_much_is_no_current_that_comparators_switch_at_res
     ],
 )
 def test_a_load_that_presses_the_user_to_one_side_of_the_play_is_seen(hidden, shipped_plant, flaws, is_pressed):
-    found = pressed(shipped_plant, prepared(shipped_plant, hidden.cycles(hidden.Flaws(**flaws), 2, 5)))
+    found = find_pressing_load(shipped_plant, prepared(shipped_plant, hidden.cycles(hidden.Flaws(**flaws), 2, 5)))
     assert (found is not None) is is_pressed
 
 

@@ -6,8 +6,8 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.cycles import measured
-from ema.discrepancy.actuator.entrants import weighed
+from ema.discrepancy.actuator.cycles import prepare
+from ema.discrepancy.actuator.entrants import weigh_sets
 from ema.discrepancy.actuator.free import K_FREE
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
@@ -18,14 +18,14 @@ from ema.discrepancy.actuator.search import Search, start_model
 def test_what_was_fitted_on_the_way_to_the_cause_has_no_probability(hidden, shipped_plant):
     made = hidden.cycles(hidden.Flaws(flux=-0.06), 4, 31, motions=(hidden.chirp(duration=0.25),))
     record = Record(tuple(Cycle(n, c) for n, c in enumerate(made)))
-    plant = EmaPlant(shipped_plant, measured(shipped_plant, [record]), 2)
+    plant = EmaPlant(shipped_plant, prepare(shipped_plant, [record]), 2)
     search = Search(plant, Noise(plant, {}), [0, 1], [2, 3])
     before = start_model(search, {})
     first = {c.effect: c for c in reversed(candidates(shipped_plant, plant.data, ()))}
     of = [first[name] for name in ("winding_resistance", "clock_skew", "magnet_flux")]
     start = {name: x for c in of for name, x in c.probes()[0].items()}
     answer = search.model(of, (*K_FREE, *(f for c in of for f in c.frees)), start, None, 4)
-    outcome, models = weighed(search, before, answer)
+    outcome, models = weigh_sets(search, before, answer)
     assert outcome.posterior[0].causes == ("magnet_flux",)
     assert outcome.posterior[0].probability > 0.9
     assert models[0].names == ("magnet_flux",)

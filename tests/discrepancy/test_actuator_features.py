@@ -9,11 +9,11 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator import features as f
-from ema.discrepancy.actuator.controller import gains, of_error, said_of_error
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.controller import describe_function_of_error, fit_function_of_error, fit_gains
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.fit import residuals
-from ema.discrepancy.actuator.gear import resonance
-from ema.discrepancy.actuator.noise import Noise, verdict
+from ema.discrepancy.actuator.gear import find_resonance
+from ema.discrepancy.actuator.noise import Noise, judge
 from ema.discrepancy.actuator.plant import EmaPlant
 from ema.models import hf
 
@@ -47,7 +47,7 @@ def test_two_implementations_agree_within_noise(hidden, shipped_plant):
     flawless = hidden.Flaws()
     theirs = np.array(
         [
-            measured(shipped_plant, [Record((Cycle(0, hidden.cycle(flawless, command, hidden.rest(), seed)),))]).y[0]
+            prepare(shipped_plant, [Record((Cycle(0, hidden.cycle(flawless, command, hidden.rest(), seed)),))]).y[0]
             for seed in range(6)
         ]
     )
@@ -60,23 +60,23 @@ def test_two_implementations_agree_within_noise(hidden, shipped_plant):
 
 def nothing_is_noise(plant, record: Record) -> bool:
     """Whether the nominal simulation leaves noise of a flawless actuator's record."""
-    data = measured(plant, [record])
+    data = prepare(plant, [record])
     ema = EmaPlant(plant, data)
     noise = Noise(ema, {})
     cycles = range(data.n_cycles)
     left = residuals(ema, noise, {}, cycles, 16)
     nothing_free = [np.zeros((len(data.y[ema.first[m]]), 0)) for m in range(ema.n_motions)]
-    return verdict(noise, [left[c] for c in cycles], cycles, nothing_free, 1.0 / 16).is_noise
+    return judge(noise, [left[c] for c in cycles], cycles, nothing_free, 1.0 / 16).is_noise
 
 
 def prepared(plant, cycles):
-    return measured(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
+    return prepare(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
 
 
 def test_a_record_cut_out_of_a_longer_motion_starts_in_motion(hidden, shipped_plant):
     whole = hidden.cycle(hidden.Flaws(), hidden.sine(6e-3, 5.0, 0.36), hidden.rest(), 3)
     cut = Cycle(0, {name: x[500:3500] for name, x in whole.items()})
-    assert measured(shipped_plant, [Record((cut,))]).speed[0] > 10.0
+    assert prepare(shipped_plant, [Record((cut,))]).speed[0] > 10.0
     assert nothing_is_noise(shipped_plant, Record((cut,)))
 
 
@@ -93,7 +93,9 @@ def test_a_resonating_gear_is_seen_in_rotor_and_user(hidden, shipped_plant, k2):
     """With its backlash, and though the user still swings when a cycle begins."""
     flaws = hidden.Flaws(compliance=1.5e-5, user_damping=30.0, k2=k2)
     soft = hidden.cycles(flaws, 3, 1, motions=(hidden.chirp(),))
-    found = resonance(shipped_plant, measured(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(soft)))]))
+    found = find_resonance(
+        shipped_plant, prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(soft)))])
+    )
     assert found is not None
     assert found.compliance * found.inertia == pytest.approx(1.5e-5 * 0.6, rel=0.02)
     assert found.inertia == pytest.approx(0.6, rel=0.02)
@@ -107,7 +109,7 @@ def test_a_plant_without_play_may_have_a_gear_that_gives(hidden, shipped_plant):
     plant = shipped_plant.model_copy(update={"transmission": transmission})
     soft = hidden.cycles(hidden.Flaws(compliance=2e-5, user_damping=30.0), 2, 3)
     with np.errstate(all="raise"):
-        found = resonance(plant, prepared(plant, soft))
+        found = find_resonance(plant, prepared(plant, soft))
     assert found is not None
     assert found.compliance == pytest.approx(2e-5, rel=0.03)
     assert found.k2 == 0.0
@@ -116,7 +118,9 @@ def test_a_plant_without_play_may_have_a_gear_that_gives(hidden, shipped_plant):
 def test_drag_and_friction_at_the_user_do_not_hide_its_resonance(hidden, shipped_plant):
     """What the user loses to the fixed world is no damping of the gear: asked for that alone, nothing was found."""
     flaws = hidden.Flaws(compliance=2.5e-5, user_inertia=0.15, user_damping=8.0, user_drag=10.0, user_rubbing=1.0)
-    found = resonance(shipped_plant, prepared(shipped_plant, hidden.cycles(flaws, 3, 1, motions=(hidden.chirp(),))))
+    found = find_resonance(
+        shipped_plant, prepared(shipped_plant, hidden.cycles(flaws, 3, 1, motions=(hidden.chirp(),)))
+    )
     assert found is not None
     assert found.compliance * found.inertia == pytest.approx(2.5e-5 * 0.15, rel=0.03)
     assert found.drag / found.inertia == pytest.approx(10.0 / 0.15, rel=0.1)
@@ -129,7 +133,7 @@ def test_drag_and_friction_at_the_user_do_not_hide_its_resonance(hidden, shipped
 )
 def test_a_stiff_gear_has_no_resonance(hidden, shipped_plant, flaws):
     stiff = hidden.cycles(hidden.Flaws(**flaws), 2, 1)
-    assert resonance(shipped_plant, prepared(shipped_plant, stiff)) is None
+    assert find_resonance(shipped_plant, prepared(shipped_plant, stiff)) is None
 
 
 def test_the_control_balance_of_a_sound_actuator_is_small(hidden, shipped_plant):
@@ -144,16 +148,16 @@ def test_the_control_balance_of_a_sound_actuator_is_small(hidden, shipped_plant)
 @pytest.mark.parametrize("change", [-0.3, -0.1, 0.2])
 def test_other_gains_of_the_controller_are_read_from_the_record(hidden, shipped_plant, change):
     data = prepared(shipped_plant, hidden.cycles(hidden.Flaws(speed_gain=change), 2, 4))
-    assert gains(shipped_plant, data.signals) == pytest.approx((1.0, 1.0 + change), abs=0.03)
+    assert fit_gains(shipped_plant, data.signals) == pytest.approx((1.0, 1.0 + change), abs=0.03)
     control = shipped_plant.control.model_copy(update={"K_p": shipped_plant.control.K_p / (1.0 + change)})
     other = shipped_plant.model_copy(update={"control": control})
     data = prepared(other, hidden.cycles(hidden.Flaws(), 2, 4))
-    assert gains(other, data.signals) == pytest.approx((1.0 + change, 1.0), abs=0.03)
+    assert fit_gains(other, data.signals) == pytest.approx((1.0 + change, 1.0), abs=0.03)
 
 
 @pytest.mark.parametrize("flaws", [{}, {"viscous": 1e-4}, {"k3": 0.3}, {"position_delay": 1e-3}, {"reaction": 3e-6}])
 def test_what_is_no_controller_is_not_taken_for_other_gains(hidden, shipped_plant, flaws):
-    assert gains(shipped_plant, prepared(shipped_plant, hidden.cycles(hidden.Flaws(**flaws), 2, 4)).signals) is None
+    assert fit_gains(shipped_plant, prepared(shipped_plant, hidden.cycles(hidden.Flaws(**flaws), 2, 4)).signals) is None
 
 
 def rests_of_control(plant, hidden, flaws):
@@ -169,9 +173,9 @@ def rests_of_control(plant, hidden, flaws):
 
 @pytest.mark.parametrize("deadband", [1e-4, 2e-4])
 def test_a_controller_that_ignores_small_errors_is_told_by_the_error_it_ignores(hidden, shipped_plant, deadband):
-    found = of_error(shipped_plant, rests_of_control(shipped_plant, hidden, {"deadband": deadband}))
+    found = fit_function_of_error(shipped_plant, rests_of_control(shipped_plant, hidden, {"deadband": deadband}))
     assert found is not None
-    (sentence,) = said_of_error(found)
+    (sentence,) = describe_function_of_error(found)
     told = re.search(r"as if errors below (\S+) rad were ignored", sentence)
     assert told is not None
     assert float(told[1]) == pytest.approx(deadband, rel=0.05)
@@ -181,7 +185,7 @@ def test_a_controller_that_ignores_small_errors_is_told_by_the_error_it_ignores(
     "flaws", [{}, {"viscous": 1e-4}, {"position_delay": 1e-3}, {"speed_gain": -0.2}, {"k3": 0.3}, {"gain_a": 0.05}]
 )
 def test_what_is_no_law_of_the_error_is_not_taken_for_one(hidden, shipped_plant, flaws):
-    assert of_error(shipped_plant, rests_of_control(shipped_plant, hidden, flaws)) is None
+    assert fit_function_of_error(shipped_plant, rests_of_control(shipped_plant, hidden, flaws)) is None
 
 
 @pytest.mark.parametrize(
@@ -196,6 +200,8 @@ def test_what_is_no_law_of_the_error_is_not_taken_for_one(hidden, shipped_plant,
 )
 def test_a_law_of_the_error_is_told_in_words_where_one_number_makes_it(current, told):
     at = np.linspace(-4e-3, 4e-3, 24)
-    (said,) = said_of_error({"at": at.tolist(), "current": current(at).tolist(), "share": 0.9, "gain": 3e3})
+    (said,) = describe_function_of_error(
+        {"at": at.tolist(), "current": current(at).tolist(), "share": 0.9, "gain": 3e3}
+    )
     assert ("as if" in said) == (told is not None)
     assert told is None or told in said

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.fit import fit
-from ema.discrepancy.actuator.flat import settled
+from ema.discrepancy.actuator.flat import settle
 from ema.discrepancy.actuator.free import K_FREE, free
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
@@ -20,14 +20,14 @@ OFF = 0.006  # of shorts and gains, against each other
 @pytest.mark.slow
 def test_shorts_and_gains_are_told_apart_and_the_intervals_say_how_well(hidden, shipped_plant):
     cycles = hidden.cycles(hidden.Flaws(**GAINS, **K), 3, 4, (hidden.chirp(), hidden.sine(8e-3, 5.0, 0.5)))
-    data = measured(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
+    data = prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
     plant = EmaPlant(shipped_plant, data)
     truth = {f"current_gain.{name}": value for name, value in GAINS.items()} | {name: K.get(name, 0.0) for name in K}
     start = {name: value + (OFF if name in K else -OFF) for name, value in truth.items()} | {"k4": OFF}
     noise = Noise(plant, start)
     frees = (*K_FREE, *(free(f"current_gain.{name}", 0.02) for name in GAINS))
     every = [0, 1, 2]
-    found = settled(plant, noise, fit(plant, noise, frees, start, every, n_iterations=2), every)
+    found = settle(plant, noise, fit(plant, noise, frees, start, every, n_iterations=2), every)
     for name, value in truth.items():
         assert abs(found.point[name] - value) < min(OFF, 2.0 * found.sd[name])  # nearer than it began
     for name, value in K.items():

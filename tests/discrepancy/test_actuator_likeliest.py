@@ -10,7 +10,7 @@ import pytest
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator import examine as whole
 from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.free import K_FREE
 from ema.discrepancy.actuator.model import Model
 from ema.discrepancy.actuator.paths import Path
@@ -20,8 +20,8 @@ from ema.discrepancy.engine.posterior import Entry
 DRAG = 7e-5
 STARTS = {"viscous_drag": {"viscous_drag.coefficient": DRAG}, "inertia": {"inertia.change": 0.1}}
 # What the search does to its answer before it is weighed, and where among its arguments that answer stands.
-LEAVE_AS_IT_IS = {"at_the_minimum": 1, "with_fewer_faults": 2, "simpler": 2,
-                  "with_temperature_only": 1, "with_zero": 1}  # fmt: skip
+LEAVE_AS_IT_IS = {"settle_at_minimum": 1, "drop_faults": 2, "simplify": 2,
+                  "drop_constant_parts": 1, "take_resolver_zero": 1}  # fmt: skip
 
 
 def led_to(name):
@@ -59,14 +59,14 @@ def test_an_effect_that_faults_are_far_likelier_than_is_not_named(p, named):
 def test_the_likeliest_set_takes_the_place_of_an_unlikely_answer(hidden, shipped_plant, monkeypatch):
     """Led to a heavier rotor where there is drag, with real noise, fits and contest on two short cycles."""
     alone = lambda search, start: [Path.of(search, search.model((), K_FREE, start, None, 2))]  # noqa: E731
-    monkeypatch.setattr(whole, "faults_only", alone)
-    monkeypatch.setattr(whole, "growing", lambda search, before: None)
-    monkeypatch.setattr(whole, "shortest", led_to("inertia"))
+    monkeypatch.setattr(whole, "begin_with_faults_alone", alone)
+    monkeypatch.setattr(whole, "find_growing_faults", lambda search, before: None)
+    monkeypatch.setattr(whole, "choose_path", led_to("inertia"))
     for step, at in LEAVE_AS_IT_IS.items():
         monkeypatch.setattr(whole, step, lambda *of, at=at: (of[at], of[at + 1]))
     cycles = hidden.cycles(hidden.Flaws(viscous=DRAG), 2, 1, (hidden.chirp(),))
     record = Record(tuple(Cycle(number, channels) for number, channels in enumerate(cycles)))
-    findings = whole.examine(shipped_plant, measured(shipped_plant, [record])).findings
+    findings = whole.examine(shipped_plant, prepare(shipped_plant, [record])).findings
     (effect,) = findings.effects
     assert effect.name == "viscous_drag"
     assert effect.confidence > 0.9

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
 from ema.discrepancy.actuator.sampling import between, positions_every
 
@@ -38,7 +38,7 @@ def test_the_command_is_known_better_than_its_resolution(hidden):
 @pytest.mark.slow
 def test_a_sound_actuator_is_adequate_from_the_bus_too(hidden, shipped_plant):
     cycles = hidden.cycles(hidden.Flaws(k1=0.03), 3, 5, (hidden.chirp(),))
-    findings = examine(shipped_plant, measured(shipped_plant, [record(cycles)])).findings
+    findings = examine(shipped_plant, prepare(shipped_plant, [record(cycles)])).findings
     assert findings.verdict == "adequate"
     assert findings.gain.k_before == pytest.approx((0.03, 0.0, 0.0, 0.0, 0.0, 0.0), abs=0.006)
 
@@ -58,7 +58,7 @@ def told_ranges(findings):
 @pytest.mark.slow
 def test_faults_that_grow_are_no_flaw_of_the_simulation_and_not_the_temperatures(hidden, shipped_plant):
     cycles = warming(hidden, (20.0, 35.0, 45.0, 50.0), *(hidden.Flaws(k1=0.02 * n, k3=0.03 * n) for n in range(4)))
-    findings = examine(shipped_plant, measured(shipped_plant, [record(cycles)])).findings
+    findings = examine(shipped_plant, prepare(shipped_plant, [record(cycles)])).findings
     assert findings.verdict == "adequate"
     assert findings.gain.k_before == pytest.approx((0.03, 0.0, 0.045, 0.0, 0.0, 0.0), abs=0.006)
     assert set(told_ranges(findings)) == {"k1", "k3"}
@@ -69,7 +69,7 @@ def test_a_magnet_that_weakens_with_the_temperature_is_told_from_a_short_that_gr
     temperatures = (20.0, 32.0, 43.0, 50.0)
     flaws = [hidden.Flaws(k3=0.02 * n, flux=-0.0015 * (x - 20.0)) for n, x in enumerate(temperatures)]
     record_ = record(warming(hidden, temperatures, *flaws))
-    findings = examine(shipped_plant, measured(shipped_plant, [record_])).findings
+    findings = examine(shipped_plant, prepare(shipped_plant, [record_])).findings
     # Faults of each cycle are known within 0.002: of the last one that leaves 1.5 noise floors, and it would have been
     # the only one held out; over all of them it is 1.1.
     assert findings.verdict == "explained"
@@ -87,7 +87,7 @@ def test_a_magnet_that_weakens_with_the_temperature_is_told_from_a_short_that_gr
 @pytest.mark.slow
 def test_an_effect_is_named_from_the_bus_too(hidden, shipped_plant):
     cycles = hidden.cycles(hidden.Flaws(viscous=6e-5, k1=0.03), 3, 5, (hidden.chirp(),))
-    findings = examine(shipped_plant, measured(shipped_plant, [record(cycles)])).findings
+    findings = examine(shipped_plant, prepare(shipped_plant, [record(cycles)])).findings
     assert [e.name for e in findings.effects] == ["viscous_drag"]
     assert findings.effects[0].parameters["coefficient"].value == pytest.approx(6e-5, rel=0.02)
 
@@ -97,7 +97,7 @@ def test_effects_are_named_beside_faults_that_grow(hidden, shipped_plant):
     """Faults of each cycle stand for the drag too, at first; what grows is told as it does beside the drag."""
     flaws = [hidden.Flaws(viscous=6e-5, k1=0.02 * n, k3=0.03 * n) for n in range(6)]
     cycles = [hidden.cycles(f, 1, 5 + n, (hidden.chirp(),))[0] for n, f in enumerate(flaws)]
-    findings = examine(shipped_plant, measured(shipped_plant, [record(cycles)])).findings
+    findings = examine(shipped_plant, prepare(shipped_plant, [record(cycles)])).findings
     assert findings.verdict == "explained"
     assert [(e.name, e.indistinguishable_from) for e in findings.effects] == [("viscous_drag", ())]
     assert findings.effects[0].parameters["coefficient"].value == pytest.approx(6e-5, rel=0.05)

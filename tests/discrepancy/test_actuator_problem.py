@@ -7,14 +7,14 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.problem import ActuatorProblem, as_cause
 from ema.discrepancy.engine.records import Pool, seeds
 
 
 def problem(plant, made: Record) -> ActuatorProblem:
-    return ActuatorProblem(EmaPlant(plant, measured(plant, [made]), 2))
+    return ActuatorProblem(EmaPlant(plant, prepare(plant, [made]), 2))
 
 
 @pytest.fixture(scope="module")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import split
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.repeating import repeating, said
+from ema.discrepancy.actuator.repeating import describe, repeating
 from ema.discrepancy.actuator.search import Search
 
 
@@ -26,8 +26,8 @@ from ema.discrepancy.actuator.search import Search
 )
 def test_what_does_not_repeat_is_told(hidden, shipped_plant, flaws, repeats):
     cycles = hidden.cycles(hidden.Flaws(**flaws), 4, 7, motions=(hidden.chirp(),))
-    data = measured(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
+    data = prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
     plant = EmaPlant(shipped_plant, data)
     share = repeating(Search(plant, Noise(plant, {}), *split(data)), {})
     assert (share is None) is (repeats is None)
-    assert bool(said(share)) is (repeats is False)
+    assert bool(describe(share)) is (repeats is False)

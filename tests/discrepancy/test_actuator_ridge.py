@@ -8,14 +8,14 @@ from benchmarks.foreign import record, truths
 from ema.core.names import FAULTS
 from ema.core.records import Record
 from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.conditions import as_recorded
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.conditions import take_recorded_conditions
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import split
 from ema.discrepancy.actuator.free import K_FREE
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.ridge import nearest, walked
-from ema.discrepancy.actuator.screening import Screened, probed
+from ema.discrepancy.actuator.ridge import sort_by_nearness, walk_ridge
+from ema.discrepancy.actuator.screening import Screened, probe
 from ema.discrepancy.actuator.search import Search
 
 ALONE = dict(zip(FAULTS, (0.0643, 0.1001, 0.1367, 0.1221, 0.0953, 0.0117), strict=True))  # where faults alone end
@@ -25,18 +25,18 @@ ALONE = dict(zip(FAULTS, (0.0643, 0.1001, 0.1367, 0.1221, 0.0953, 0.0117), stric
 def test_a_magnet_is_found_between_none_of_the_shorts_and_all_of_them(shipped_plant):
     """Slopes had led from either end of the ridge to nothing: shorts stayed 0.037 too large, with no magnet named."""
     truth = truths()["flux_and_faults"]
-    data = measured(shipped_plant, [Record(record("flux_and_faults").cycles[:4])])
-    plant = EmaPlant(as_recorded(shipped_plant, data.signals)[0], data)
+    data = prepare(shipped_plant, [Record(record("flux_and_faults").cycles[:4])])
+    plant = EmaPlant(take_recorded_conditions(shipped_plant, data.signals)[0], data)
     search = Search(plant, Noise(plant, ALONE), *split(data))
     by_name = {c.effect: c for c in candidates(plant.plant, data, [])}
-    magnet, *others = probed(search, [by_name[name] for name in ("magnet_flux", "recorder_offset", "saturation")])
+    magnet, *others = probe(search, [by_name[name] for name in ("magnet_flux", "recorder_offset", "saturation")])
     model = search.model((), K_FREE, ALONE, None, 1)
-    kept = nearest(search, model, [Screened(0.0, c, {}) for c in (*others, magnet)])
+    kept = sort_by_nearness(search, model, [Screened(0.0, c, {}) for c in (*others, magnet)])
     assert [s.candidate.effect for s in kept] == ["magnet_flux"]  # the others do nothing like three shorts
     stuck = search.model((magnet,), (*K_FREE, *magnet.frees), model.fit.point, None, 3)
     shorts = [name for name in FAULTS if name in magnet.faults]
     assert min(stuck.fit.point[name] - truth["k"][FAULTS.index(name)] for name in shorts) > 0.03
-    found = walked(search, model, stuck, magnet)
+    found = walk_ridge(search, model, stuck, magnet)
     assert found.heldout < stuck.heldout
     assert found.fit.point["magnet_flux.change"] == pytest.approx(truth["hidden"]["magnet_flux.change"], abs=0.004)
     for name, true in zip(FAULTS, truth["k"], strict=True):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import STEPS, EmaPlant
 from ema.discrepancy.actuator.runs import Asked, Memory, Runs
@@ -26,7 +26,7 @@ POINTS = (
 @pytest.fixture(scope="module")
 def data(hidden, shipped_plant):
     motions = (hidden.chirp(duration=0.22), hidden.chirp(duration=0.22, amplitude=0.006))
-    return measured(
+    return prepare(
         shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(hidden.cycles(hidden.Flaws(), 2, 3, motions))))]
     )
 

@@ -11,8 +11,8 @@ import pytest
 from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.balance.of_records import balance
 from ema.discrepancy.axis.balance.smooth import bumps_at, local_polynomial
-from ema.discrepancy.axis.balance.telling import sentences, told
-from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.balance.telling import describe, sentences
+from ema.discrepancy.axis.between import examine_ways
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.axis.wording import findings
 from ema.models.axis_config import LinearAxis, RotaryAxis
@@ -27,14 +27,14 @@ def of_table(positioner, seed=1, **hidden):
     bench = positioner.Table(**hidden)
     plant = AxisPlant(LinearAxis.model_validate(positioner.table_plant(bench)), [positioner.table(bench, seed)])
     plant.between = "held"
-    return told(balance(plant), linear=True)
+    return describe(balance(plant), linear=True)
 
 
 def of_servo(positioner, seed=1, **hidden):
     bench = positioner.Servo(**hidden)
     plant = AxisPlant(RotaryAxis.model_validate(positioner.servo_plant(bench)), [positioner.servo(bench, seed)])
     plant.between = "held"
-    return told(balance(plant), linear=False)
+    return describe(balance(plant), linear=False)
 
 
 def by_name(found):
@@ -70,7 +70,7 @@ def test_what_loses_one_polarity_is_a_drive_and_no_friction(axis_bench, hidden_a
     bench, plant_file, motions = hidden_axis.drawn(1)
     bench, _, rng = hidden_axis.bench_with(["one_sided_driver"], 1, bench)
     record = axis_bench.record(bench, rng, motions=motions)
-    (term,) = told(balance(AxisPlant(RotaryAxis.model_validate(plant_file), [record])), linear=False)["terms"]
+    (term,) = describe(balance(AxisPlant(RotaryAxis.model_validate(plant_file), [record])), linear=False)["terms"]
     assert term["name"] == "drive_unequal"
     assert term["confidence"] > 0.9
 
@@ -80,7 +80,7 @@ def test_a_flaw_of_sensor_or_converter_is_no_law_of_the_balance(axis_bench, hidd
     bench, plant_file, motions = hidden_axis.drawn(1)
     bench, _, rng = hidden_axis.bench_with([hidden], 1, bench)
     record = axis_bench.record(bench, rng, motions=motions)
-    assert told(balance(AxisPlant(RotaryAxis.model_validate(plant_file), [record])), linear=False)["terms"] == []
+    assert describe(balance(AxisPlant(RotaryAxis.model_validate(plant_file), [record])), linear=False)["terms"] == []
 
 
 def test_a_motor_that_saturates_is_friction_by_the_square_of_its_torque_or_saturation(axis_bench, hidden_axis):
@@ -88,7 +88,7 @@ def test_a_motor_that_saturates_is_friction_by_the_square_of_its_torque_or_satur
     bench, plant_file, motions = hidden_axis.drawn(1)
     bench, _, rng = hidden_axis.bench_with(["saturation"], 1, bench)
     record = axis_bench.record(bench, rng, motions=motions)
-    terms = told(balance(AxisPlant(RotaryAxis.model_validate(plant_file), [record])), linear=False)["terms"]
+    terms = describe(balance(AxisPlant(RotaryAxis.model_validate(plant_file), [record])), linear=False)["terms"]
     assert all("saturation" in t["indistinguishable_from"] for t in terms)
 
 
@@ -111,7 +111,7 @@ def test_a_pendulum_and_friction_that_grows_with_load_are_named_under_a_position
 def test_free_runs_name_what_the_balance_shows_and_the_model_is_extended_by_it(positioner):
     bench = positioner.Servo(by_load=0.25)
     plant = AxisPlant(RotaryAxis.model_validate(positioner.servo_plant(bench)), [positioner.servo(bench, 1)])
-    found = findings(plant, examined(plant))
+    found = findings(plant, examine_ways(plant))
     named = {e.name: e for e in found.effects}
     assert set(named) == {"pendulum", "output_load_friction"}
     assert all(e.confidence > 0.9 for e in named.values())
@@ -143,7 +143,7 @@ def test_a_frame_that_swings_takes_nothing_from_the_mass(positioner, swing):
     record = Record((Cycle(0, {**cycle.channels, "q": seen}),))
     plant = AxisPlant(LinearAxis.model_validate(positioner.table_plant(positioner.Table())), [record])
     plant.between = "held"
-    found = told(balance(plant), linear=True)
+    found = describe(balance(plant), linear=True)
     assert found["base"]["inertia"]["value"] == pytest.approx(90.0, rel=0.02)
     assert found["terms"] == []
 
@@ -154,7 +154,9 @@ def test_irregular_time_stamps_are_taken_as_they_are(positioner):
     (cycle,) = record.cycles
     kept = np.sort(np.random.default_rng(5).choice(cycle.n_samples, cycle.n_samples // 2, replace=False))
     thinned = type(record)((type(cycle)(0, {name: x[kept] for name, x in cycle.channels.items()}),))
-    found = told(balance(AxisPlant(LinearAxis.model_validate(positioner.table_plant(bench)), [thinned])), linear=True)
+    found = describe(
+        balance(AxisPlant(LinearAxis.model_validate(positioner.table_plant(bench)), [thinned])), linear=True
+    )
     assert by_name(found)["viscous_by_direction"]["parameters"]["difference"]["value"] == pytest.approx(-37.0, rel=0.1)
 
 

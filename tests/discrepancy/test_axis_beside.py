@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.agreeing import together
+from ema.discrepancy.axis.agreeing import merge
 from ema.discrepancy.axis.beside import balance_beside
-from ema.discrepancy.axis.named_laws import missing, of_balance
+from ema.discrepancy.axis.named_laws import find_missing, name_laws
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.findings import FoundEffect
 from ema.models.axis_config import RotaryAxis
@@ -37,10 +37,10 @@ def named(effects):
 
 def test_what_a_saturating_motor_does_not_give_is_no_friction_by_load(geared):
     plant = plant_of(geared, saturation=0.2)
-    alone, _ = together(plant, [], "unexplained", {})
+    alone, _ = merge(plant, [], "unexplained", {})
     assert "quadratic_load_friction" in named(alone)  # what the balance takes it for
     point = {"F_d": geared.Axis().F, "saturation.emf": 0.2}
-    beside, added = together(plant, [found("saturation")], "partly explained", point)
+    beside, added = merge(plant, [found("saturation")], "partly explained", point)
     assert named(beside) == {"saturation"}
     assert balance_beside(plant, point).terms == ()
     assert added is None
@@ -49,20 +49,20 @@ def test_what_a_saturating_motor_does_not_give_is_no_friction_by_load(geared):
 def test_a_law_that_is_there_too_is_named_beside_it(geared):
     plant = plant_of(geared, saturation=0.2, dry_slope=0.04)
     point = {"F_d": geared.Axis().F, "saturation.emf": 0.2}
-    beside, added = together(plant, [found("saturation")], "partly explained", point)
+    beside, added = merge(plant, [found("saturation")], "partly explained", point)
     assert named(beside) == {"saturation", "friction_slope"}
     assert added is not None
 
 
 def test_a_law_of_the_balance_is_missing_until_something_stands_for_it(geared):
     plant = plant_of(geared, dry_slope=0.04)
-    terms = missing(plant.balance, [])
-    (effect,) = of_balance(plant, plant.balance, terms)
+    terms = find_missing(plant.balance, [])
+    (effect,) = name_laws(plant, plant.balance, terms)
     assert effect.name == "friction_slope"
     assert effect.sentence.endswith("(shown by the balance along the measured motion, not by free runs)")
     assert all(q.low <= q.value <= q.high for q in effect.parameters.values())
-    assert missing(plant.balance, [found("friction_slope")]) == []
-    assert missing(plant.balance, [found("saturation")]) == terms
+    assert find_missing(plant.balance, [found("friction_slope")]) == []
+    assert find_missing(plant.balance, [found("saturation")]) == terms
 
 
 def test_sensors_are_undone_before_the_balance_is_asked(geared):

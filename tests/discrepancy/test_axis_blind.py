@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.between import examine_ways
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
@@ -17,7 +17,7 @@ from ema.models.axis_config import RotaryAxis
 def look(axis_bench, hidden_axis, names, seed):
     bench, truth, rng = hidden_axis.bench_with(names, seed)
     plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [axis_bench.record(bench, rng)])
-    return examined(plant), truth
+    return examine_ways(plant), truth
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -32,7 +32,7 @@ def test_friction_in_a_side_minimum_is_fitted_again_and_nothing_is_named(axis_be
     bench, plant_file, motions = hidden_axis.drawn(280)
     bench, _, rng = hidden_axis.bench_with([], 280, bench)
     record = axis_bench.record(bench, rng, motions=motions)
-    outcome = examined(AxisPlant(RotaryAxis.model_validate(plant_file), [record]))
+    outcome = examine_ways(AxisPlant(RotaryAxis.model_validate(plant_file), [record]))
     assert outcome.verdict == "adequate"
     assert outcome.effects == []
 
@@ -41,7 +41,7 @@ def test_more_friction_is_fitted_and_not_called_an_effect(axis_bench, hidden_axi
     bench, _, rng = hidden_axis.bench_with([], 11)
     bench.F_d, bench.F_s = 1.6 * bench.F_d, 1.6 * bench.F_s
     plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [axis_bench.record(bench, rng)])
-    outcome = examined(plant)
+    outcome = examine_ways(plant)
     assert outcome.verdict == "adequate"
     assert outcome.k_after[0] == pytest.approx(bench.F_d, rel=0.01)
 
@@ -52,7 +52,7 @@ def test_drop_that_fades_at_small_currents_brings_no_second_cause(axis_bench, hi
     bench, plant_file, motions = hidden_axis.drawn(2)
     bench.voltage = lambda u, i: u + 0.15 * shape(i / 0.12)
     record = axis_bench.record(bench, np.random.default_rng(2), motions=motions)
-    (drop,) = examined(AxisPlant(RotaryAxis.model_validate(plant_file), [record])).effects
+    (drop,) = examine_ways(AxisPlant(RotaryAxis.model_validate(plant_file), [record])).effects
     assert drop["name"] == "inverter_drop"
     assert drop["indistinguishable_from"] == []
     assert drop["parameters"]["voltage"]["low"] <= 0.15 <= drop["parameters"]["voltage"]["high"]

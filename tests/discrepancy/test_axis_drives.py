@@ -10,10 +10,10 @@ import pytest
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.balance.course import courses
-from ema.discrepancy.axis.balance.integrated import rows
+from ema.discrepancy.axis.balance.integrated import integrate_rows
 from ema.discrepancy.axis.balance.laws import laws
 from ema.discrepancy.axis.balance.of_records import shown_by
-from ema.discrepancy.axis.balance.telling import told
+from ema.discrepancy.axis.balance.telling import describe
 from ema.discrepancy.axis.closed_loop import closed_loop
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models.axis_config import LinearAxis, RotaryAxis
@@ -33,7 +33,7 @@ def changed(record, without=(), **channels):
 def by_name(plant_file, record):
     plant = AxisPlant(RotaryAxis.model_validate(plant_file), [record])
     plant.between = "held"
-    found = told(plant.balance, linear=False)
+    found = describe(plant.balance, linear=False)
     return {term["name"]: term["parameters"] for term in found["terms"]}, found["base"]
 
 
@@ -151,7 +151,7 @@ def test_what_one_speed_in_one_direction_cannot_show_is_not_tried(positioner):
     parts = [cycle.rows(int(a), int(b)) for a, b in edges if b - a > 300]
     one_speed = Record(tuple(Cycle(k, part.channels) for k, part in enumerate(parts)))
     plant = AxisPlant(LinearAxis.model_validate(positioner.table_plant(bench)), [one_speed])
-    found = rows(plant, courses(plant))
+    found = integrate_rows(plant, courses(plant))
     shown = {law.name for law in shown_by(found, list(laws(found.motion, linear=True)))}
     assert not {"constant_load", "quadratic_drag", "viscous_by_direction"} & shown
     assert "spring_load" in shown

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ema.discrepancy.axis import candidates
-from ema.discrepancy.axis.dropped import dropped
+from ema.discrepancy.axis.dropped import list_dropped
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.outcome import Gain, Outcome
-from ema.discrepancy.selection import base_model
+from ema.discrepancy.selection import fit_base
 from ema.effects import registry
 from ema.effects.search import Span
 from ema.models.axis_config import RotaryAxis
@@ -20,7 +20,7 @@ def looked(axis_bench, drag, seed=1):
     bench = axis_bench.Bench(C=2e-5 + drag)
     record = axis_bench.record(bench, np.random.default_rng(seed), duration=1.0)
     plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [record])
-    point = base_model(plant).fits[0].point
+    point = fit_base(plant).fits[0].point
     tried = [{"name": "viscous_drag", "round": 1, "score": 1000.0, "error": 10.0, "rms": 1.0}]
     nothing = Gain(0.0, 0.0, 0.0)
     return plant, Outcome("unexplained", "", 0.0, [], {}, nothing, nothing, [], [], [], [], tried, point=point)
@@ -29,7 +29,7 @@ def looked(axis_bench, drag, seed=1):
 def test_a_parameter_at_its_bound_is_fitted_again_with_wider_ones(axis_bench, monkeypatch):
     narrow = replace(registry()["viscous_drag"], on_axis=lambda s: {"coefficient": Span(0.0, 2e-5, (1e-5,), 1e-5)})
     monkeypatch.setattr(candidates, "registry", lambda: {**registry(), "viscous_drag": narrow})
-    (entry,) = dropped(*looked(axis_bench, drag=1e-4), named=set())
+    (entry,) = list_dropped(*looked(axis_bench, drag=1e-4), named=set())
     assert entry["name"] == "viscous_drag"
     assert "the end of what is searched (0 … 2e-05)" in entry["why"]
     assert "10 times as wide viscous_drag.coefficient = 0.0001 " in entry["why"]
@@ -38,5 +38,5 @@ def test_a_parameter_at_its_bound_is_fitted_again_with_wider_ones(axis_bench, mo
 
 def test_what_is_named_or_takes_nothing_is_not_told(axis_bench):
     plant, outcome = looked(axis_bench, drag=1e-4)
-    assert dropped(plant, outcome, named={"viscous_drag"}) == []
-    assert dropped(*looked(axis_bench, drag=0.0), named=set()) == []
+    assert list_dropped(plant, outcome, named={"viscous_drag"}) == []
+    assert list_dropped(*looked(axis_bench, drag=0.0), named=set()) == []

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from ema.discrepancy.axis.external import with_external
+from ema.discrepancy.axis.external import add_external
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.extended import write_extended
 from ema.discrepancy.findings import FoundEffect, Quantity
@@ -37,12 +37,12 @@ def cogging(order, confidence=0.99):
 
 
 def test_records_that_agree_name_no_neighbour(bench):
-    assert with_external(bench((OWN,), (OWN,)), []) == []
+    assert add_external(bench((OWN,), (OWN,)), []) == []
 
 
 def test_a_torque_that_turns_round_between_records_is_a_neighbour_s_or_another_zero(bench):
     plant = bench((OWN, NEIGHBOUR), (OWN, TURNED))
-    (e,) = with_external(plant, [cogging(9.0)])
+    (e,) = add_external(plant, [cogging(9.0)])
     assert plant.zeros["record 2"].angle == 0.0
     assert (e.name, e.indistinguishable_from) == ("external_torque", ("another_zero",))
     assert e.parameters["order"].value == 9.0
@@ -52,7 +52,7 @@ def test_a_torque_that_turns_round_between_records_is_a_neighbour_s_or_another_z
 
 
 def test_a_torque_that_only_one_of_three_records_has_is_named_with_that_record(bench):
-    (e,) = with_external(bench((OWN,), (OWN, (0.004, 12.0, 0.3)), (OWN,)), [])
+    (e,) = add_external(bench((OWN,), (OWN, (0.004, 12.0, 0.3)), (OWN,)), [])
     assert (e.name, e.indistinguishable_from) == ("external_torque", ())
     assert e.confidence > 0.9
     assert "acts in record 2 and in no other" in e.sentence
@@ -69,18 +69,18 @@ def test_a_torque_that_only_one_of_three_records_has_is_named_with_that_record(b
     ],
 )
 def test_one_record_tells_a_neighbour_by_the_motor_s_own_orders_only(bench, declared, order, others, confidence):
-    (e,) = with_external(bench((OWN,), **declared), [cogging(order)])
+    (e,) = add_external(bench((OWN,), **declared), [cogging(order)])
     assert (e.name, e.indistinguishable_from) == ("cogging", others)
     assert e.confidence == pytest.approx(confidence, abs=0.01)
 
 
 def test_a_set_with_a_neighbour_is_no_surer_than_the_line(bench):
-    (e,) = with_external(bench((OWN,)), [cogging(12.0, 0.63)])
+    (e,) = add_external(bench((OWN,)), [cogging(12.0, 0.63)])
     assert e.of_set == pytest.approx(0.63, abs=1e-3)
 
 
 def test_what_acts_in_some_records_is_said_in_the_extended_model_and_acts_in_none(bench, tmp_path):
-    (e,) = with_external(bench((OWN,), (OWN, NEIGHBOUR)), [])
+    (e,) = add_external(bench((OWN,), (OWN, NEIGHBOUR)), [])
     plant = tmp_path / "plant.yaml"
     plant.write_text("kind: axis\nJ: 1e-4\nF_d: 0.02\nk_t: 0.05\n")
     write_extended(plant, [e], tmp_path / "extended.yaml")

@@ -11,8 +11,8 @@ from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.balance.as_effects import point
 from ema.discrepancy.axis.balance.laws import laws
 from ema.discrepancy.axis.balance.of_records import balance
-from ema.discrepancy.axis.balance.telling import told
-from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.balance.telling import describe
+from ema.discrepancy.axis.between import examine_ways
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.plant import Candidate, Free
 from ema.models.axis_config import RotaryAxis
@@ -34,7 +34,7 @@ def plant_of(geared, *, temperature=False, seconds=12.0, more=(), **hidden):
 
 
 def laws_of(geared, **how):
-    return {term["name"]: term for term in told(balance(plant_of(geared, **how)), linear=False)["terms"]}
+    return {term["name"]: term for term in describe(balance(plant_of(geared, **how)), linear=False)["terms"]}
 
 
 def test_nothing_hidden_needs_none_of_these_laws_though_it_warms_up(geared):
@@ -44,7 +44,7 @@ def test_nothing_hidden_needs_none_of_these_laws_though_it_warms_up(geared):
 def test_friction_with_memory_is_named_with_the_angle_over_which_it_builds_up_and_free_runs_follow(geared):
     plant = plant_of(geared, bristle=0.15)
     b = balance(plant)
-    (law,) = told(b, linear=False)["terms"]
+    (law,) = describe(b, linear=False)["terms"]
     assert law["name"] == "friction_memory"
     assert law["confidence"] > 0.9
     assert law["indistinguishable_from"] == []
@@ -143,7 +143,7 @@ def test_a_torque_channel_that_reads_too_much_is_named_or_in_a_set_where_inertia
     channels = {name: x for name, x in cycle.channels.items() if name != "i_q"}
     record = Record((Cycle(0, {**channels, "torque": 1.15 * axis.k_t * cycle["i_q"]}),))
     model = {"kind": "axis", "drive": "torque", "J": axis.J, "F_d": axis.F, "C": axis.C}
-    (found,) = examined(AxisPlant(RotaryAxis.model_validate(model), [record])).effects
+    (found,) = examine_ways(AxisPlant(RotaryAxis.model_validate(model), [record])).effects
     assert found["name"] == "drive_gain"
     assert len(found["indistinguishable_from"]) <= 1
     assert found["parameters"]["gain"]["value"] == pytest.approx(0.15, abs=0.005)

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from ema.discrepancy.axis.balance.telling import told
+from ema.discrepancy.axis.balance.telling import describe
 from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.ruling import ruling
+from ema.discrepancy.axis.ruling import rule_by_balance
 from ema.models.axis_config import RotaryAxis
 
 WIDE = 1.5  # half intervals of 95 %: nine numbers are asked for
@@ -25,7 +25,7 @@ def arm(support):
             ("shoulder", "elbow"), ("outer", "inner"), pendulum.records(build, seed), strict=True
         ):
             plant = AxisPlant(RotaryAxis.model_validate(pendulum.plant(side)), [record])
-            out[name], plants[name] = told(plant.balance, linear=False), plant
+            out[name], plants[name] = describe(plant.balance, linear=False), plant
         return out, pendulum.truth(build), plants
 
     return of
@@ -48,7 +48,9 @@ def test_rigid_body_terms_of_both_joints_are_those_of_the_arm(arm):
         assert base["dry_friction"]["value"] == pytest.approx({"shoulder": 0.1, "elbow": 0.08}[name], rel=0.25)
         assert found[name]["terms"] == []
         assert found[name]["explained"]["fitted"] > 0.97
-        said = ruling(plants[name], SimpleNamespace(verdict="unexplained"))  # of free runs, which know no neighbour
+        said = rule_by_balance(
+            plants[name], SimpleNamespace(verdict="unexplained")
+        )  # of free runs, which know no neighbour
         assert [e.name for e in said.effects] == ["linked_axis"]
         assert said.effects[0].confidence > 0.9
         assert not said.effects[0].in_every_record  # the axis model has no neighbour

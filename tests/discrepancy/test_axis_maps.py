@@ -7,9 +7,9 @@ import pytest
 
 from ema.discrepancy.axis import balance_pictures
 from ema.discrepancy.axis.balance.course import courses
-from ema.discrepancy.axis.balance.own_zeros import with_zeros
-from ema.discrepancy.axis.balance.telling import told
-from ema.discrepancy.axis.external import with_external
+from ema.discrepancy.axis.balance.own_zeros import add_zeros
+from ema.discrepancy.axis.balance.telling import describe
+from ema.discrepancy.axis.external import add_external
 from ema.discrepancy.axis.measured import Zero
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
@@ -29,11 +29,11 @@ def bench(maps):
 
 
 def zeros_of(plant):
-    return {c.record: c.zero for c in with_zeros(plant, courses(plant))}
+    return {c.record: c.zero for c in add_zeros(plant, courses(plant))}
 
 
 def test_every_line_of_one_turn_is_found_with_its_size(maps, bench):
-    found = told(bench(maps.record(maps.OWN + maps.NEIGHBOUR, 1)).balance, linear=False)
+    found = describe(bench(maps.record(maps.OWN + maps.NEIGHBOUR, 1)).balance, linear=False)
     assert found["explained"]["with_laws"] > 0.99
     lines = {q["order"]["value"]: q["amplitude"] for q in (term["parameters"] for term in found["terms"])}
     for amplitude, n, _ in maps.OWN + maps.NEIGHBOUR:
@@ -41,7 +41,7 @@ def test_every_line_of_one_turn_is_found_with_its_size(maps, bench):
 
 
 def test_a_map_of_friction_alone_shows_no_line(maps, bench):
-    assert told(bench(maps.record((), 1)).balance, linear=False)["terms"] == []
+    assert describe(bench(maps.record((), 1)).balance, linear=False)["terms"] == []
 
 
 @pytest.mark.parametrize("F_d", [3.5e-3, 1e-2])
@@ -54,7 +54,7 @@ def test_another_zero_is_what_lays_the_lines_over_each_other(maps, bench, F_d):
 def test_what_turns_round_is_a_neighbour_s_and_no_other_zero(maps, bench):
     plant = bench(maps.record(maps.OWN + maps.NEIGHBOUR, 1), maps.record(maps.OWN + maps.turned(maps.NEIGHBOUR), 2))
     assert zeros_of(plant) == {"record 1": 0.0, "record 2": 0.0}
-    found = {e.parameters["order"].value: e for e in with_external(plant, [])}
+    found = {e.parameters["order"].value: e for e in add_external(plant, [])}
     assert sorted(found) == [14.0, 28.0]
     assert all(e.name == "external_torque" and e.indistinguishable_from == () for e in found.values())
     assert found[14.0].parameters["amplitude"].value == pytest.approx(6e-3, rel=0.03)  # from one to the other

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.between import examine_ways
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.axis.weak_form import weak_form
 from ema.models.axis_config import LinearAxis, RotaryAxis
@@ -31,7 +31,7 @@ def look_at(axis_other, setup, *, angles=None, fitted=(), **hidden):
     model = LinearAxis if setup.motion == "linear" else RotaryAxis
     record = axis_other.record(setup, 1)
     plant = model.model_validate({**axis_other.plant(setup), "fitted": list(fitted)})
-    return examined(AxisPlant(plant, [with_angles(record, angles) if angles else record]))
+    return examine_ways(AxisPlant(plant, [with_angles(record, angles) if angles else record]))
 
 
 def test_a_stage_with_nothing_hidden_is_adequate_though_its_encoder_counts(axis_other):
@@ -145,6 +145,6 @@ def test_noise_that_is_a_little_more_than_declared_is_no_cause(axis_other):
     setup = axis_other.BASE
     declared = {"theta_m": 0.94 * 2e-4, "w_m": 0.94 * 0.05, "i_q": 0.94 * 5e-3, "u_q": 0.94 * 0.02}
     plant = RotaryAxis.model_validate({**axis_other.plant(setup), "noise": declared})
-    outcome = examined(AxisPlant(plant, [axis_other.record(setup, 1)]))
+    outcome = examine_ways(AxisPlant(plant, [axis_other.record(setup, 1)]))
     assert outcome.verdict == "adequate"
     assert outcome.effects == []

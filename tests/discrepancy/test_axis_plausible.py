@@ -9,7 +9,7 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.plausible import electrical, implausible
+from ema.discrepancy.axis.plausible import electrical, find_implausible
 from ema.models.axis_config import RotaryAxis
 
 MOTOR = {"kind": "axis", "drive": "current", "J": 5e-5, "F_d": 0.02, "k_t": 0.05, "k_e": 0.0333, "R": 0.5, "L": 3e-4}
@@ -29,7 +29,7 @@ def bench(R=0.5, k_e=0.0333, seed=1):
 
 def said(record, point=None, **changed):
     plant = AxisPlant(RotaryAxis.model_validate({**MOTOR, **changed}), [record])
-    return implausible(plant, SimpleNamespace(point=point or {"F_d": 0.02}))
+    return find_implausible(plant, SimpleNamespace(point=point or {"F_d": 0.02}))
 
 
 def test_a_sound_plant_file_is_left_in_peace():

@@ -11,7 +11,7 @@ import pytest
 
 from ema.core import resources
 from ema.core.records import read_record
-from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.between import examine_ways
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models import axis_config
 
@@ -20,7 +20,7 @@ DATA = Path(__file__).parents[1] / "data" / "laas_mn4004"
 
 def look(name):
     plant = axis_config.load(resources.config("laas_mn4004.yaml"))
-    return examined(AxisPlant(plant, [read_record(DATA / f"{name}.csv")]))
+    return examine_ways(AxisPlant(plant, [read_record(DATA / f"{name}.csv")]))
 
 
 def by_name(outcome, name):

@@ -7,7 +7,7 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.ripple import ripples, said
+from ema.discrepancy.axis.ripple import describe, find_ripples
 from ema.models.axis_config import RotaryAxis
 
 SPEED, NOISE = 28.4, 0.1
@@ -27,25 +27,25 @@ def cycle(lines=(), seed=1, speed=SPEED):
 
 @pytest.mark.parametrize("speed", [SPEED, -SPEED])
 def test_lines_are_found_with_their_size(speed):
-    found = ripples(cycle([(0.19, 6, 0.3), (0.06, 1, 1.0)], speed=speed))
+    found = find_ripples(cycle([(0.19, 6, 0.3), (0.06, 1, 1.0)], speed=speed))
     assert {one.order: one.amplitude for one in found} == pytest.approx({6: 0.19, 1: 0.06}, rel=0.2)
 
 
 def test_noise_has_no_lines():
-    assert [ripples(cycle(seed=seed)) for seed in range(5)] == [[]] * 5
+    assert [find_ripples(cycle(seed=seed)) for seed in range(5)] == [[]] * 5
 
 
 def test_a_line_that_comes_and_goes_is_none():
     own = cycle([(0.19, 6, 0.3)])
     w = own["w_m"].copy()
     w[400:] = cycle(seed=2)["w_m"][400:]
-    assert ripples(Cycle(0, {**own.channels, "w_m": w})) == []
+    assert find_ripples(Cycle(0, {**own.channels, "w_m": w})) == []
 
 
 def test_causes_stand_beside_each_other_and_what_tells_them_apart():
     plant_file = {"kind": "axis", "drive": "voltage", "J": 1e-5, "F_d": 1e-3, "k_t": 0.03, "k_e": 0.03, "R": 1.0}
     plant = AxisPlant(RotaryAxis.model_validate(plant_file), [Record((cycle([(0.19, 6, 0.3)]),))])
-    (text,) = said(plant)
+    (text,) = describe(plant)
     torque = float(text.split("a torque of ")[1].split()[0])
     assert torque == pytest.approx(abs(1e-5 * 6j * SPEED + 0.03 * 0.03) * 0.19, rel=0.1)
     assert "order 6" in text

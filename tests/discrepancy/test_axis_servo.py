@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.between import Rereading, examined
+from ema.discrepancy.axis.between import Rereading, examine_ways
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.fitting import fit
 from ema.discrepancy.plant import Fitted
 from ema.discrepancy.progress import Progress
-from ema.discrepancy.selection import base_model, one_more
+from ema.discrepancy.selection import fit_base, fit_with_each
 from ema.models.axis_config import RotaryAxis
 
 ACTS_BETWEEN = "the speed loop acts between the samples of the record too"
@@ -25,7 +25,7 @@ def servo(support) -> ModuleType:
 
 
 def look(servo, plant, **hidden):
-    return examined(AxisPlant(RotaryAxis.model_validate(plant), [servo.record(1, **hidden)]))
+    return examine_ways(AxisPlant(RotaryAxis.model_validate(plant), [servo.record(1, **hidden)]))
 
 
 @pytest.mark.parametrize("samples", [True, False])
@@ -54,7 +54,7 @@ def test_a_drive_with_a_clock_of_its_own_adds_up_to_a_delay(servo):
     (cycle,) = servo.record(1, position=True, seconds=6.0)
     t, i_q = cycle["t"], cycle["i_q"]
     record = Record((Cycle(0, {**cycle.channels, "i_q": np.interp(t * (1.0 + 5e-4), t, i_q)}),))
-    outcome = examined(AxisPlant(RotaryAxis.model_validate(servo.CURRENT), [record]))
+    outcome = examine_ways(AxisPlant(RotaryAxis.model_validate(servo.CURRENT), [record]))
     assert [e["name"] for e in outcome.effects] == ["clock_skew"]
     found = outcome.effects[0]["parameters"]["currents"]
     assert found["value"] == pytest.approx(5e-4, rel=0.03)
@@ -70,16 +70,16 @@ def test_a_drive_that_is_held_is_taken_so_unless_an_effect_foretells_more(suppor
     geared = support("geared")
     axis = geared.Axis(by_square=1.9)
     plant = AxisPlant(RotaryAxis.model_validate(geared.plant(axis)), [geared.record(axis, 1, seconds=5.0)])
-    plain = base_model(plant)
+    plain = fit_base(plant)
 
     def only(*names):
         return lambda point, blocks: [c for c in plant.candidates(point, blocks) if c.key in names]
 
-    trials = one_more(plant, plain, only("saturation", "clock_skew of the drive"), str)
+    trials = fit_with_each(plant, plain, only("saturation", "clock_skew of the drive"), str)
     reread = Rereading(plant, Progress())
     assert not reread(plain, trials["saturation"])
     assert plant.between == "straight"
-    beside = one_more(plant, trials["saturation"], only("clock_skew of the drive"), str)
+    beside = fit_with_each(plant, trials["saturation"], only("clock_skew of the drive"), str)
     assert reread(trials["saturation"], beside["clock_skew of the drive"])
     assert plant.between == "held"
 

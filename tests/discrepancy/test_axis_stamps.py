@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle
-from ema.discrepancy.axis.stamps import said, stamps
+from ema.discrepancy.axis.stamps import describe, examine_stamps
 
 PERIOD, N = 1e-3, 4000
 
@@ -25,16 +25,18 @@ def cycle(seed, *, sampled=0.0, stamped=0.0, noise=1e-5):
 )
 def test_the_motion_tells_whether_samples_or_stamps_vary(how, samples):
     for seed in range(8):
-        assert stamps(cycle(seed, **how), "theta_m").samples == samples
+        assert examine_stamps(cycle(seed, **how), "theta_m").samples == samples
 
 
 def test_their_jitter_is_measured_and_said():
-    (sentence,) = said("bench", (cycle(1, stamped=5e-5),), "theta_m")
-    assert stamps(cycle(1, stamped=5e-5), "theta_m").jitter == pytest.approx(5e-5, rel=0.05)
+    (sentence,) = describe("bench", (cycle(1, stamped=5e-5),), "theta_m")
+    assert examine_stamps(cycle(1, stamped=5e-5), "theta_m").jitter == pytest.approx(5e-5, rel=0.05)
     assert "bench: time stamps jitter by 5e-05 s rms" in sentence
-    assert said("bench", (cycle(1),), "theta_m") == []
+    assert describe("bench", (cycle(1),), "theta_m") == []
 
 
 def test_an_angle_whose_noise_hides_it_says_nothing():
-    wrong = [stamps(cycle(seed, stamped=5e-5, noise=0.01), "theta_m").samples == "as stamped" for seed in range(40)]
+    wrong = [
+        examine_stamps(cycle(seed, stamped=5e-5, noise=0.01), "theta_m").samples == "as stamped" for seed in range(40)
+    ]
     assert sum(wrong) <= 1

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis.balance.agreement import _compared
-from ema.discrepancy.axis.balance.telling import sentences, told
+from ema.discrepancy.axis.balance.agreement import _compare
+from ema.discrepancy.axis.balance.telling import describe, sentences
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models.axis_config import LinearAxis, RotaryAxis
 
@@ -27,7 +27,7 @@ def tables(support):
         records = [positioner.table(positioner.Table(**own), seed, seconds=12.0) for seed, own in enumerate(hidden, 1)]
         plant = AxisPlant(LinearAxis.model_validate(positioner.table_plant(positioner.Table())), records)
         plant.between = "held"
-        return told(plant.balance, linear=True)
+        return describe(plant.balance, linear=True)
 
     return of
 
@@ -43,7 +43,7 @@ def spindles(support):
         hidden = [np.eye(8)[other.COGGING] * size + np.eye(8)[other.ORDER] * ORDER for size in amplitudes]
         records = [other.record(replace(setup, hidden=tuple(h)), seed) for seed, h in enumerate(hidden, 1)]
         plant = AxisPlant(RotaryAxis.model_validate(other.plant(setup)), records)
-        return told(plant.balance, linear=False), plant
+        return describe(plant.balance, linear=False), plant
 
     return of
 
@@ -122,7 +122,7 @@ def test_the_test_of_agreement_is_right_as_often_as_it_says():
         V = np.diag([1.0, 4.0, 2.0, 1.0])
         samples = rng.multivariate_normal([5.0, 0.0, 5.0, 0.0], V, 20)
         covariance = np.cov(samples.T) / 20
-        a = _compared("line", None, samples.mean(axis=0).reshape(2, 2), covariance, 20, needed=False)
+        a = _compare("line", None, samples.mean(axis=0).reshape(2, 2), covariance, 20, needed=False)
         rare.append(a.p < 0.05)
     assert 0.03 < np.mean(rare) < 0.09
 
@@ -132,7 +132,7 @@ def test_a_record_that_cannot_show_a_coefficient_neither_agrees_nor_contradicts(
     """As a standstill the inertia, whichever record it is."""
     values = np.array([[1.0], [1.02 - last], [last]])
     V = np.diag(np.where(values.ravel() == 0.0, 0.0, 1e-4))
-    a = _compared("inertia", None, values, V, 20, needed=False)
+    a = _compare("inertia", None, values, V, 20, needed=False)
     sees = tuple(values.ravel() != 0.0)
     assert (a.shown, a.could) == (sees, sees)
     assert a.is_one(1)

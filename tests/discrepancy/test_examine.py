@@ -13,8 +13,8 @@ from ema.discrepancy.held_out import by_record, over_folds, residual_over_folds,
 from ema.discrepancy.plant import Block, Candidate, Errors, Free
 from ema.discrepancy.progress import Progress
 from ema.discrepancy.rounds import State, leave_out, select
-from ema.discrepancy.selection import base_model, folds, one_more
-from ema.discrepancy.trust import at_bound, told_effects, without_unlikely
+from ema.discrepancy.selection import fit_base, fit_with_each, split_into_folds
+from ema.discrepancy.trust import at_bound, describe_effects, drop_unlikely
 from ema.discrepancy.verdict import correlation_test, judge, scale_test
 
 N_BLOCKS, N = 12, 120
@@ -108,18 +108,18 @@ def test_what_no_effect_can_do_is_unexplained():
 
 def test_an_effect_that_a_later_one_makes_superfluous_is_left_out():
     toy = Toy(4, ("a", "b"), b=0.8)
-    plain = base_model(toy)
-    trials = one_more(toy, plain, toy.candidates, str)
-    both = one_more(toy, trials["a"], toy.candidates, str)["b"]
+    plain = fit_base(toy)
+    trials = fit_with_each(toy, plain, toy.candidates, str)
+    both = fit_with_each(toy, trials["a"], toy.candidates, str)["b"]
     assert [c.key for c in both.accepted] == ["a", "b"]
     assert [c.key for c in leave_out(toy, both, {0}).accepted] == ["b"]
     progress = Progress()
     state = State(plain, plain, [], [])
     select(toy, state, progress)
     assert [c.key for c in state.model.accepted] == ["b"]
-    assert without_unlikely(toy, state, progress)["b"] > 0.9
+    assert drop_unlikely(toy, state, progress)["b"] > 0.9
     final = fit(toy, [*toy.base, *state.model.accepted[0].free], state.model.fits[0].point, range(N_BLOCKS))
-    (told,) = told_effects(toy, state, {"b": 1.0}, final.point, final.draw)
+    (told,) = describe_effects(toy, state, {"b": 1.0}, final.point, final.draw)
     assert told["name"] == "b"
 
 
@@ -153,9 +153,9 @@ def test_what_is_known_beforehand_counts_as_a_measurement():
 
 def test_gains_are_of_parts_that_were_not_fitted():
     toy = Toy(7, ("a",), a=1.0)
-    plain = base_model(toy)
-    with_a = one_more(toy, plain, toy.candidates, str)["a"]
-    of = folds(toy.blocks)
+    plain = fit_base(toy)
+    with_a = fit_with_each(toy, plain, toy.candidates, str)["a"]
+    of = split_into_folds(toy.blocks)
     assert sorted(j for out in of for j in out) == list(range(N_BLOCKS))
     gain = over_folds(toy, plain, with_a)
     assert gain.err_before == pytest.approx(np.sqrt(2.0), rel=0.1)

@@ -7,7 +7,7 @@ from click.testing import CliRunner
 from ema_postflight.discrepancy import discrepancy
 
 from ema.core.errors import ConfigError
-from ema.discrepancy.explaining import why
+from ema.discrepancy.explaining import explain_cause
 from ema.discrepancy.findings import Findings, FoundEffect, Gain
 
 GAIN = Gain(0.1, 0.1, 0.1, 0.1, 0.1)
@@ -35,12 +35,12 @@ def test_every_cause_has_its_answer(tmp_path, cause, says):
 
 
 def test_nothing_was_fitted_where_noise_is_left():
-    assert "is noise" in why(Findings("adequate", [], GAIN).as_dict(), "cogging")
+    assert "is noise" in explain_cause(Findings("adequate", [], GAIN).as_dict(), "cogging")
 
 
 def test_what_is_no_effect_is_refused_with_those_that_are():
     with pytest.raises(ConfigError, match=r"--explain frictoin: no such effect; there are .*viscous_drag"):
-        why(Findings("adequate", [], GAIN).as_dict(), "frictoin")
+        explain_cause(Findings("adequate", [], GAIN).as_dict(), "frictoin")
 
 
 @pytest.mark.parametrize(("content", "says"), [(None, "is not there"), ("{", "cannot be read"), ("[]", "no findings")])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ema.discrepancy.findings import Findings, Gain
-from ema.discrepancy.folds import Folds, dealt
+from ema.discrepancy.folds import Folds, deal
 
 
 def folds(after, before=None, floor=0.01):
@@ -46,8 +46,8 @@ def test_one_part_alone_has_no_error_and_the_file_stays_json():
 
 
 def test_every_part_is_left_out_once_and_neighbours_are_apart():
-    groups = dealt(range(20), 8)
+    groups = deal(range(20), 8)
     assert sorted(x for g in groups for x in g) == list(range(20))
     assert len(groups) == 8
     assert all(b - a > 1 for g in groups for a, b in itertools.pairwise(g))
-    assert dealt([4, 5], 8) == [[4], [5]]
+    assert deal([4, 5], 8) == [[4], [5]]

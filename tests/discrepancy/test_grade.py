@@ -9,7 +9,7 @@ import pytest
 
 from ema.discrepancy.findings import Findings, FoundEffect, Gain
 from ema.discrepancy.folds import Folds
-from ema.discrepancy.grade import LIMIT, Left, graded
+from ema.discrepancy.grade import LIMIT, Left, grade
 
 SPRING = FoundEffect("spring_load", 0.99, (), {}, "a spring", "slow motion")
 
@@ -41,8 +41,8 @@ def left(is_chance, error, residual, is_form=False):
     ],
 )
 def test_the_truth_table(of, nothing_named, causes_named):
-    assert graded(left(*of), named=False) == nothing_named
-    assert graded(left(*of), named=True) == causes_named
+    assert grade(left(*of), named=False) == nothing_named
+    assert grade(left(*of), named=True) == causes_named
 
 
 def test_every_case_of_it_holds_what_is_promised():
@@ -51,36 +51,36 @@ def test_every_case_of_it_holds_what_is_promised():
     for chance, error, residual, form in itertools.product((True, False), around, around, (True, False)):
         of = left(chance, error, residual, form)
         if error > LIMIT:
-            assert graded(of, named=True) == "partly explained"
+            assert grade(of, named=True) == "partly explained"
         if chance or max(error, residual) <= LIMIT:
-            assert graded(of, named=False) == "adequate"
+            assert grade(of, named=False) == "adequate"
         else:
-            assert graded(of, named=False) == "unexplained"
+            assert grade(of, named=False) == "unexplained"
 
 
 def test_noise_that_was_estimated_may_be_larger_and_nothing_is_claimed_by_that():
     """A cascade with nothing hidden left 0.71 floors of error and 1.25 of residual, by a noise known to 10 %."""
     known, estimated = (Left(False, folds(0.7, 0.7), folds(1.2, 1.3), noise_uncertainty=u) for u in (0.0, 0.1))
-    assert [graded(of, named=False) for of in (known, estimated)] == ["unexplained", "adequate"]
-    assert graded(Left(False, folds(5.0, 4.0), folds(9.0, 9.0), noise_uncertainty=0.1), named=False) == "unexplained"
+    assert [grade(of, named=False) for of in (known, estimated)] == ["unexplained", "adequate"]
+    assert grade(Left(False, folds(5.0, 4.0), folds(9.0, 9.0), noise_uncertainty=0.1), named=False) == "unexplained"
     loud = Left(False, folds(1.25, 1.25), folds(1.0, 1.0), noise_uncertainty=0.1)
-    assert graded(loud, named=True) == "partly explained"
+    assert grade(loud, named=True) == "partly explained"
 
 
 def test_one_part_that_runs_away_raises_no_alarm_where_the_residual_is_noise_and_is_no_claim_either():
     """A stage with nothing hidden left 1.75 ± 0.88 floors of its free runs and 1.10 of the residual."""
     away = folds(*[1.0] * 9, 5.0)
-    assert graded(Left(False, away, folds(1.1, 1.1)), named=False) == "adequate"
-    assert graded(Left(False, away, folds(1.1, 1.1)), named=True) == "partly explained"
-    assert graded(Left(False, away, folds(1.1, 3.0)), named=False) == "unexplained"
-    assert graded(Left(False, folds(*[1.7] * 9, 1.9), folds(1.1, 1.1)), named=False) == "unexplained"
+    assert grade(Left(False, away, folds(1.1, 1.1)), named=False) == "adequate"
+    assert grade(Left(False, away, folds(1.1, 1.1)), named=True) == "partly explained"
+    assert grade(Left(False, away, folds(1.1, 3.0)), named=False) == "unexplained"
+    assert grade(Left(False, folds(*[1.7] * 9, 1.9), folds(1.1, 1.1)), named=False) == "unexplained"
 
 
 def test_one_lucky_part_does_not_make_it_explained():
     """The part that a single split would have held out is at noise; the others are not."""
     unlucky = folds(1.0, 1.5, 1.5, 1.5, 1.5, 1.5)
-    assert graded(Left(False, folds(1.0), folds(1.0)), named=True) == "explained"
-    assert graded(Left(False, unlucky, folds(1.0)), named=True) == "partly explained"
+    assert grade(Left(False, folds(1.0), folds(1.0)), named=True) == "explained"
+    assert grade(Left(False, unlucky, folds(1.0)), named=True) == "partly explained"
 
 
 def test_what_is_small_is_told_with_its_error():

@@ -8,7 +8,7 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import split
 from ema.discrepancy.actuator.free import K_FREE
 from ema.discrepancy.actuator.motions import motions
@@ -22,7 +22,7 @@ from ema.discrepancy.actuator.search import Model, Search
 def recorded(hidden, shipped_plant):
     """A search on two cycles of a small motion far from the middle, with a spring that pulls there."""
     cycles = hidden.cycles(hidden.Flaws(spring=100.0), 2, 5, (hidden.chirp(2e-3),), hidden.Bench(position=0.05))
-    data = measured(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
+    data = prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
     plant = EmaPlant(shipped_plant, data)
     return Search(plant, Noise(plant, {}), *split(data))
 

@@ -9,7 +9,7 @@ from ema.discrepancy.plant import Block, Candidate, Free
 from ema.discrepancy.progress import Progress
 from ema.discrepancy.rounds import State
 from ema.discrepancy.selection import Tried
-from ema.discrepancy.trust import leans_in_a_fold, without_unlikely
+from ema.discrepancy.trust import drop_unlikely, leans_in_a_fold
 
 N_BLOCKS, N = 12, 200
 LARGE, SMALL = (
@@ -74,7 +74,7 @@ def named(small, acting):
     both = plant.tried("large", "small")
     rounds = [({"large": both}, plant.tried("small")), ({"small": both}, plant.tried("large"))]
     state = State(plant.tried(), both, rounds, [])
-    trust = without_unlikely(plant, state, Progress())
+    trust = drop_unlikely(plant, state, Progress())
     return trust, [row["name"] for row in state.unlikely]
 
 

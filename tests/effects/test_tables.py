@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.discrepancy.actuator.extension import TABLES, as_extension
+from ema.discrepancy.actuator.extension import TABLES, write_extension
 from ema.discrepancy.actuator.features import Signals, features
 from ema.discrepancy.actuator.structure import structure
 from ema.discrepancy.actuator.weak import torque as weak_torque
@@ -90,7 +90,7 @@ def test_what_the_residual_shows_of_a_table_is_that_table(shipped_plant, quantit
     found = structure(
         [weak_torque(one, r, sd, shipped_plant.control.rate)], shipped_plant.control.rate, {"torque": 9.0}
     )
-    effects = as_extension(found)
+    effects = write_extension(found)
     assert set(effects) == {name}
     argument = {"position": "theta_u", "speed": "w_m"}[quantity]
     for x in 0.7 * np.linspace(places[0], places[-1], 7):
@@ -109,7 +109,7 @@ STRUCTURE = {
 
 def test_a_structure_becomes_the_effects_of_a_plant(shipped_plant):
     """The function that explains most of it and has an effect; the plant with it simulates."""
-    effects = as_extension(STRUCTURE)
+    effects = write_extension(STRUCTURE)
     assert set(effects) == {"position_torque"}
     assert law("position_torque", theta_u=1e-3)(effects["position_torque"]) == pytest.approx(0.0, abs=3e-4)
     plant = Actuator.model_validate(shipped_plant.model_dump() | {"effects": effects})
@@ -127,7 +127,7 @@ def test_a_structure_becomes_the_effects_of_a_plant(shipped_plant):
     ],
 )
 def test_what_no_effect_can_say_is_no_extension(structure):
-    assert as_extension(structure) == {}
+    assert write_extension(structure) == {}
 
 
 def test_a_table_that_is_not_credible_is_none():
@@ -135,4 +135,4 @@ def test_a_table_that_is_not_credible_is_none():
     big = {"of": "position", "at": [-1e-3, 1e-3], "torque": [0.0, 0.5], "share": 0.9}
     point = {"of": "position", "at": [1e-3], "torque": [0.01], "share": 0.9}
     for function in (big, point):
-        assert as_extension({"functions": [function]}) == {}
+        assert write_extension({"functions": [function]}) == {}

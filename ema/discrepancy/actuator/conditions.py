@@ -75,7 +75,7 @@ def supply_voltage(plant: Actuator, signals: Sequence[Signals]) -> float | None:
     return float(np.polyfit(P, u_dc, 1)[1])
 
 
-def as_recorded(plant: Actuator, signals: Sequence[Signals]) -> tuple[Actuator, list[str]]:
+def take_recorded_conditions(plant: Actuator, signals: Sequence[Signals]) -> tuple[Actuator, list[str]]:
     """The plant under the conditions of the records where these are others, and what to tell a reader of them."""
     sensors = plant.sensors
     noise = {"current_noise": (current_noise(plant, signals), sensors.adc_step, "A", 0.0)}

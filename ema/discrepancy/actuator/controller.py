@@ -37,7 +37,7 @@ ALIKE = 0.1  # share of a function that a law of one number may leave, and be to
 MOST = 0.5  # share of what the model leaves of the currents that is worth a sentence as a function of one quantity
 
 
-def gains(plant: Actuator, signals: Sequence[Signals]) -> tuple[float, float] | None:
+def fit_gains(plant: Actuator, signals: Sequence[Signals]) -> tuple[float, float] | None:
     """K_p and K_w over the plant file's by which the currents follow; None where that makes little difference."""
     lag = current_lag(plant) + 0.5
     A, y = [], []
@@ -59,15 +59,15 @@ def gains(plant: Actuator, signals: Sequence[Signals]) -> tuple[float, float] | 
     return float(both / K_w), float(K_w)
 
 
-def said(plant: Actuator, signals: Sequence[Signals]) -> list[str]:
+def describe_gains(plant: Actuator, signals: Sequence[Signals]) -> list[str]:
     """One sentence, where other gains explain the currents far better."""
-    found = gains(plant, signals)
+    found = fit_gains(plant, signals)
     if found is None:
         return []
     return [f"the currents follow a controller with {found[0]:.3g} times the K_p and {found[1]:.3g} times the K_w"]
 
 
-def of_error(plant: Actuator, rests: Sequence[tuple[Signals, Array]]) -> dict[str, Any] | None:
+def fit_function_of_error(plant: Actuator, rests: Sequence[tuple[Signals, Array]]) -> dict[str, Any] | None:
     """What a model leaves of the currents as a function of the position error; None where that is not what they are.
 
     Error and speed go together along a motion, and a delay or another gain is a function of speed: then it is none.
@@ -110,7 +110,7 @@ def _function(of: Array, r: Array) -> tuple[Array, Array, float]:
     return middle, mean, 1.0 - float(((r - mean[part]) ** 2).sum()) / float(r @ r)
 
 
-def said_of_error(found: dict[str, Any]) -> list[str]:
+def describe_function_of_error(found: dict[str, Any]) -> list[str]:
     """One sentence on what `of_error` found."""
     current = found["current"]
     return [

@@ -34,7 +34,7 @@ SAME_COMMAND, LOCAL = 1e-6, 5e-3  # [rad] by which commands of one motion may di
 AS_NOISE = 1.15  # times the noise that a curve through it may leave
 
 
-def measured(plant: Actuator, records: Sequence[Record]) -> Measured:
+def prepare(plant: Actuator, records: Sequence[Record]) -> Measured:
     """Check the records against the plant and prepare them; RecordError says in one line what is wrong."""
     commands: list[Array] = []
     labels, everything = [], []

@@ -27,18 +27,18 @@ RECORDS = 16  # simulated records of each
 WORTH_A_WORD = 0.01  # a fault
 
 
-def weighed(search: Search, before: Model, after: Model) -> tuple[Outcome, list[Model]]:
+def weigh_sets(search: Search, before: Model, after: Model) -> tuple[Outcome, list[Model]]:
     """Probabilities of the sets of effects that were tried, and the best model of each, likeliest first."""
     search.say("probabilities of what was tried")
     problem = ActuatorProblem(search.plant)
-    models = _standing(search, [before, after, *_within(search, after)])
+    models = _choose_standing(search, [before, after, *_fit_subsets(search, after)])
     found = [_entrant(search, m) for m in models]
     outcome = Contest(problem, found, _whitening(problem, search.noise), RECORDS, search.say).run(found)
     first = {e.names: m for m, e in reversed([*zip(models, found, strict=True)])}
     return outcome, [first[entry.causes] for entry in outcome.posterior]
 
 
-def as_told(outcome: Outcome) -> list[dict[str, Any]]:
+def describe_posterior(outcome: Outcome) -> list[dict[str, Any]]:
     """Sets of causes as in findings.json, likeliest first; none where nothing was tried beside faults."""
     if len(outcome.weighed) < 2:
         return []
@@ -56,7 +56,7 @@ def as_told(outcome: Outcome) -> list[dict[str, Any]]:
     ]
 
 
-def _within(search: Search, answer: Model) -> list[Model]:
+def _fit_subsets(search: Search, answer: Model) -> list[Model]:
     """The sets of effects that are in the answer's, fitted anew from it.
 
     What was chosen first was chosen without what came later, and what lies on a ridge with it may have been fitted
@@ -75,7 +75,7 @@ def _within(search: Search, answer: Model) -> list[Model]:
     return list(found.values())
 
 
-def _standing(search: Search, first: list[Model]) -> list[Model]:
+def _choose_standing(search: Search, first: list[Model]) -> list[Model]:
     """The `first` models, and those of other sets of effects, those that leave least first.
 
     Of each set its best models, however many: where they ended apart, all of them count.

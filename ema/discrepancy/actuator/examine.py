@@ -20,30 +20,30 @@ from ema.identification.alignment import aligned
 from ema.models import actuator_file
 from ema.models.actuator import Actuator
 
-from .conditions import as_recorded
-from .cycles import measured
-from .entrants import weighed
+from .conditions import take_recorded_conditions
+from .cycles import prepare
+from .entrants import weigh_sets
 from .examination import Examination
-from .gear import resonance, swinging
-from .growing import beside, growing, said, widened
+from .gear import find_resonance, start_swinging
+from .growing import describe, find_faults_beside, find_growing_faults, widen
 from .measured import Measured
 from .model import Model
 from .next_recording import next_recording
 from .noise import Noise
-from .paths import beside_steady, faults_only, gone_on, resume, shortest, with_faults
+from .paths import begin_with_faults, begin_with_faults_alone, choose_path, go_on, resume, retry_with_steady_faults
 from .plant import EmaPlant
-from .play import as_held, with_friction
+from .play import add_user_friction, take_hold_of_user
 from .search import Search
 from .simpler import (
-    simpler,
-    still_alike,
-    with_fewer_faults,
-    with_temperature_only,
-    with_zero,
+    drop_constant_parts,
+    drop_faults,
+    keep_alike,
+    simplify,
+    take_resolver_zero,
 )
-from .telling import probabilities, told, with_function
-from .thinning import thinned
-from .verdicts import at_the_minimum
+from .telling import probabilities, try_as_function, write_findings
+from .thinning import thin
+from .verdicts import settle_at_minimum
 from .weighing import is_credible
 
 MIN_CYCLES = 2
@@ -81,49 +81,49 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
             f"{data.labels[0]}: is the only cycle; at least {MIN_CYCLES} are needed, to test on one what another says"
         )
     say = say or Progress()
-    data, left_out = thinned(data)
+    data, left_out = thin(data)
     stated = plant
     train, heldout = split(data)
-    plant, conditions = as_recorded(plant, data.signals)
+    plant, conditions = take_recorded_conditions(plant, data.signals)
     if left_out:
         conditions.append(left_out)
-    gear = resonance(plant, data)
-    plant, data = as_held(plant, swinging(data, gear))
+    gear = find_resonance(plant, data)
+    plant, data = take_hold_of_user(plant, start_swinging(data, gear))
     ema = EmaPlant(plant, data, n_threads, gear)
     say("switching noise")
     search = Search(ema, Noise(ema, {}), train, heldout, say)
-    paths = faults_only(search, {})
-    of_each = None if paths[0].verdict.is_noise else growing(search, paths[0].before)
+    paths = begin_with_faults_alone(search, {})
+    of_each = None if paths[0].verdict.is_noise else find_growing_faults(search, paths[0].before)
     steady = search
     if of_each is not None:
-        search = with_faults(search, of_each, {})
-        paths = faults_only(search, search.noise.point)
-    path = shortest(search, paths)
-    if of_each is not None and path.after.effects and (other := beside_steady(steady, path)) is not None:
+        search = begin_with_faults(search, of_each, {})
+        paths = begin_with_faults_alone(search, search.noise.point)
+    path = choose_path(search, paths)
+    if of_each is not None and path.after.effects and (other := retry_with_steady_faults(steady, path)) is not None:
         of_each, search, path = None, steady, other
     for turn in range(N_BESIDE):
         if of_each is None or not path.after.effects:
             break
         resume(search, path)
-        after, v = with_temperature_only(search, path.after, path.verdict)
+        after, v = drop_constant_parts(search, path.after, path.verdict)
         if turn and path.verdict.is_noise and after is path.after:
             break
-        of_each = beside(search, after)
-        search = with_faults(search, of_each, after.fit.point)
-        path = gone_on(search, replace(path, after=after, verdict=v))
+        of_each = find_faults_beside(search, after)
+        search = begin_with_faults(search, of_each, after.fit.point)
+        path = go_on(search, replace(path, after=after, verdict=v))
     resume(search, path)
     ema = search.plant
     before, alike = path.before, path.alike
-    after, v = settled, _ = at_the_minimum(search, path.after, path.verdict)
+    after, v = settled, _ = settle_at_minimum(search, path.after, path.verdict)
     if not path.verdict_before.is_noise:
-        after, v = with_fewer_faults(search, before, after, v, alike)
-        after, v = simpler(search, before, after, v, alike, path.as_well)
+        after, v = drop_faults(search, before, after, v, alike)
+        after, v = simplify(search, before, after, v, alike, path.as_well)
     if after is not settled:
-        after, v = at_the_minimum(search, after, v)
-    after, v = with_temperature_only(search, after, v)
-    after, v = with_zero(search, after, v, alike)
+        after, v = settle_at_minimum(search, after, v)
+    after, v = drop_constant_parts(search, after, v)
+    after, v = take_resolver_zero(search, after, v, alike)
     sets = [(name, *rivals) for name, rivals in zip(after.names, alike, strict=True)]
-    outcome, models = weighed(search, before, after)
+    outcome, models = weigh_sets(search, before, after)
     unlikely = [names[0] for names in sets if not is_named(outcome, after, *names)]
     if unlikely and (not models[0].effects or is_credible(models[0])):
         say(f"{' + '.join(models[0].names) or 'faults only'} instead of {' + '.join(after.names)}")
@@ -133,17 +133,17 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
     elif unlikely:
         after, v, alike = before, path.verdict_before, []
         conditions.append(f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named")
-    alike = [still_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
+    alike = [keep_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
     if of_each is not None and after.effects:
-        after = widened(search, after)
-    findings = told(search, before, after, v, alike, outcome)
+        after = widen(search, after)
+    findings = write_findings(search, before, after, v, alike, outcome)
     findings = replace(findings, next_recording=next_recording(search, after, alike, findings.posterior))
     if findings.verdict == "adequate":
         conditions.extend(path.as_well)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
-        findings, after = with_function(search, findings, before, after)
+        findings, after = try_as_function(search, findings, before, after)
     if of_each is not None:
-        conditions.append(said(ema.data.faults, after.fit.point))
+        conditions.append(describe(ema.data.faults, after.fit.point))
     if ema.late:
         side, samples = "late" if ema.late > 0 else "early", "sample" if abs(ema.late) == 1 else "samples"
         conditions.append(f"the recorded command is {abs(ema.late)} {samples} {side} against the other channels")
@@ -152,7 +152,7 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
     if path.step:
         conditions.append(f"the comparators of the record switch as if evaluated every {1e6 * path.step:g} µs")
     findings.notes.extend(conditions)
-    findings = with_friction(stated, plant, findings)
+    findings = add_user_friction(stated, plant, findings)
     return Examination(findings, search, before, after, path.verdict_before, v)
 
 
@@ -167,6 +167,6 @@ def discrepancy(
     notes = [note for _, own in read for note in own]
     for note in notes:
         say(note)
-    examination = examine(plant, measured(plant, [record for record, _ in read]), say=say)
+    examination = examine(plant, prepare(plant, [record for record, _ in read]), say=say)
     findings = examination.findings
     return replace(findings, notes=[*notes, *findings.notes]), lambda: pictures(examination)

@@ -16,7 +16,7 @@ from .structure import WORTH_SAYING
 TABLES = {"position": "position_torque", "speed": "speed_torque"}
 
 
-def as_extension(structure: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+def write_extension(structure: Mapping[str, Any]) -> dict[str, dict[str, float]]:
     """The section ``effects`` that stands for what a structure says as a function, empty where it says none.
 
     Of the functions that explain enough of the residual the one that explains most is taken: functions of position and

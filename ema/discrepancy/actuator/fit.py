@@ -134,7 +134,7 @@ def stacked_jacobian(noise: Noise, frees: Sequence[Free], cols: Columns, cycles:
     return np.concatenate([at(c) for c in cycles])
 
 
-def bounded(J: Array, r: Array, low: Array, high: Array) -> tuple[Array, float]:
+def solve_within_bounds(J: Array, r: Array, low: Array, high: Array) -> tuple[Array, float]:
     """Least-squares solution within bounds, and the squared residual it promises."""
     scale = _lengths(J)
     margin = 1e-12 * (1.0 + high - low)
@@ -148,7 +148,7 @@ def bounds(frees: Sequence[Free], point: Point) -> tuple[Array, Array]:
     return np.array([f.low for f in frees]) - x, np.array([f.high for f in frees]) - x
 
 
-def moved(point: Point, frees: Sequence[Free], step: Array) -> Point:
+def step_to(point: Point, frees: Sequence[Free], step: Array) -> Point:
     """The point after a step."""
     return {**point, **{f.name: point.get(f.name, 0.0) + float(d) for f, d in zip(frees, step, strict=True)}}
 
@@ -192,7 +192,7 @@ def fit(
     for turn in range(n_iterations):
         if turn and np.isfinite(hopeless):
             r = np.concatenate([res[c] for c in cycles])
-            given_up = bounded(J, r, *bounds(frees, point))[1] > hopeless
+            given_up = solve_within_bounds(J, r, *bounds(frees, point))[1] > hopeless
             if given_up:
                 break
         stale = [f for f in frees if f.name not in at or _is_stale(f, frees, point, at[f.name])]
@@ -206,11 +206,11 @@ def fit(
             for f, x in zip(frees, length, strict=True)
         }
         r = np.concatenate([res[c] for c in cycles])
-        step, promised = bounded(J, r, *bounds(frees, point))
+        step, promised = solve_within_bounds(J, r, *bounds(frees, point))
         if cost - promised < 4.0 * len(frees) and not stale:
             break
         before, before_cost = point, cost
-        point, res, cost = _along(plant, noise, frees, step, (point, res, cost), cycles, n_seeds)
+        point, res, cost = _search_along(plant, noise, frees, step, (point, res, cost), cycles, n_seeds)
         improved, gained = cost < before_cost, before_cost - cost
         was_fresh = all(where == before for where in at.values())
         if not improved or gained < TRUSTED * (before_cost - promised):
@@ -218,19 +218,19 @@ def fit(
         if (not improved or gained < 0.001 * cost) and was_fresh:
             break
     # Near the optimum what seeds make of the cost hides what a step gains; the step itself is known far better.
-    last, _ = bounded(J, np.concatenate([res[c] for c in cycles]), *bounds(frees, point))
+    last, _ = solve_within_bounds(J, np.concatenate([res[c] for c in cycles]), *bounds(frees, point))
     if all(abs(d) <= abs(f.step) for d, f in zip(last, frees, strict=True)):
-        point = moved(point, frees, last)
+        point = step_to(point, frees, last)
         res = residuals(plant, noise, point, cycles, n_seeds)
     found = [res[c] for c in cycles]
     solution = np.split(_pseudo_inverse(J), np.cumsum([len(r) for r in found])[:-1], axis=1)
-    return replace(concluded(plant, noise, frees, point, cols, res, solution, 1.0 / n_seeds), given_up=given_up)
+    return replace(conclude(plant, noise, frees, point, cols, res, solution, 1.0 / n_seeds), given_up=given_up)
 
 
 Reached = tuple[Point, dict[int, Array], float]  # a point, its whitened residuals and their sum of squares
 
 
-def _along(
+def _search_along(
     plant: EmaPlant,
     noise: Noise,
     frees: Sequence[Free],
@@ -246,7 +246,7 @@ def _along(
     low, high = bounds(frees, here[0])
 
     def reach(share: float) -> Reached:
-        point = moved(here[0], frees, np.clip(share * step, low, high))
+        point = step_to(here[0], frees, np.clip(share * step, low, high))
         res = residuals(plant, noise, point, cycles, n_seeds)
         return point, res, sum(float(x @ x) for x in res.values())
 
@@ -265,7 +265,7 @@ def _along(
     return best
 
 
-def with_short_steps(plant: EmaPlant, noise: Noise, found: Fit, cycles: Sequence[int]) -> Fit:
+def refit_with_short_steps(plant: EmaPlant, noise: Noise, found: Fit, cycles: Sequence[int]) -> Fit:
     """The fit gone on with, by differences over shorter steps."""
     J = stacked_jacobian(noise, found.free, found.columns, cycles)
     length = np.linalg.norm(J, axis=0) / np.sqrt(len(cycles))
@@ -276,7 +276,7 @@ def with_short_steps(plant: EmaPlant, noise: Noise, found: Fit, cycles: Sequence
     return fit(plant, noise, frees, found.point, cycles, n_iterations=2)
 
 
-def concluded(
+def conclude(
     plant: EmaPlant,
     noise: Noise,
     frees: Sequence[Free],

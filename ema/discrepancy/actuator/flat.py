@@ -19,7 +19,7 @@ import numpy as np
 from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
-from .fit import Fit, bounded, bounds, concluded, moved, residuals_at, stacked_jacobian
+from .fit import Fit, bounds, conclude, residuals_at, solve_within_bounds, stacked_jacobian, step_to
 from .free import Free
 from .noise import Noise
 
@@ -55,7 +55,7 @@ class Probed:
         return 0.5 * (self.halves[0] + self.halves[1])
 
 
-def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> Fit:
+def settle(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> Fit:
     """`fit` brought to its minimum along flat directions too, with deviations that hold there; itself without any."""
     J = stacked_jacobian(noise, fit.free, fit.columns, cycles)
     scale = np.linalg.norm(J, axis=0)
@@ -66,7 +66,7 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
     for turn in range(N_TURNS):
         reaches, directions = _flat(J, FLAT if turn else np.inf)  # first all: no difference is above suspicion
         ends = [
-            [_towards(fit.free, point, sign * reach * v, scale) for sign in (1.0, -1.0)]
+            [_step_towards(fit.free, point, sign * reach * v, scale) for sign in (1.0, -1.0)]
             for reach, v in zip(reaches, directions, strict=True)
         ]
         ends = [pair for pair in ends if pair[0] != pair[1]]
@@ -76,11 +76,11 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
             break
         ways = scale * np.array([_difference(fit.free, *pair) for pair in ends])
         here, *there = _halves(plant, noise, [point, *(p for pair in ends for p in pair)], cycles)
-        probed = _learnt(J, ways, np.array(there[1::2]) - np.array(there[::2]))
+        probed = _learn(J, ways, np.array(there[1::2]) - np.array(there[::2]))
         J = probed.J
         A, known, rows = _system(probed, here)
-        step, _ = bounded(A * scale, known, *bounds(fit.free, point))
-        point = moved(point, fit.free, step)
+        step, _ = solve_within_bounds(A * scale, known, *bounds(fit.free, point))
+        point = step_to(point, fit.free, step)
         solution = np.linalg.solve(A * scale, rows)
         if (np.abs(ways @ (scale * step)) < ARRIVED * (ways**2).sum(axis=1)).all():
             last.append(point)
@@ -90,13 +90,13 @@ def settled(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> F
     point = {name: float(np.mean([p[name] for p in last])) for name in point}
     left = {c: x.mean(axis=0) for c, x in _by_cycle(plant, noise, [point], cycles)[0].items()}
     parts = np.split(solution, np.cumsum([len(left[c]) for c in cycles])[:-1], axis=1)
-    found = concluded(plant, noise, fit.free, point, fit.columns, left, parts, 0.5 / N_SEEDS)
+    found = conclude(plant, noise, fit.free, point, fit.columns, left, parts, 0.5 / N_SEEDS)
     wandered = np.array([np.std([p[f.name] for p in last]) for f in fit.free])
-    more = np.hypot(wandered, _unseen(noise, A * scale, len(_flat(J, FLAT)[0]), cycles))
+    more = np.hypot(wandered, _estimate_unseen(noise, A * scale, len(_flat(J, FLAT)[0]), cycles))
     return replace(found, sd={name: float(np.hypot(x, y)) for (name, x), y in zip(found.sd.items(), more, strict=True)})
 
 
-def _unseen(noise: Noise, A: Array, n_flat: int, cycles: Sequence[int]) -> Array:
+def _estimate_unseen(noise: Noise, A: Array, n_flat: int, cycles: Sequence[int]) -> Array:
     """What a difference between honest simulations makes of each parameter, along flat directions (the last of A)."""
     of_noise = sum(float((noise.of(c).fresh ** 2).sum(axis=1).mean()) for c in cycles)
     along = np.linalg.inv(A)[:, len(A) - n_flat :]
@@ -110,7 +110,7 @@ def _flat(J: Array, flat: float) -> tuple[Array, Array]:
     return FELT / length[is_flat], V[is_flat]
 
 
-def _learnt(J: Array, ways: Array, found: Array) -> Probed:
+def _learn(J: Array, ways: Array, found: Array) -> Probed:
     """The Jacobian that agrees with what was found.
 
     Parameters
@@ -160,7 +160,7 @@ def _difference(frees: Sequence[Free], high: Point, low: Point) -> Array:
     return np.array([high.get(f.name, 0.0) - low.get(f.name, 0.0) for f in frees])
 
 
-def _towards(frees: Sequence[Free], point: Point, way: Array, scale: Array) -> Point:
+def _step_towards(frees: Sequence[Free], point: Point, way: Array, scale: Array) -> Point:
     """The point as far along a way (scaled) as bounds allow, but for what is hardly felt when cut off."""
     low, high = (edge * scale for edge in bounds(frees, point))
     share = min(1.0, N_STEPS * float(np.min([abs(f.step) for f in frees] * scale / np.abs(way))))

@@ -14,11 +14,11 @@ from ema.core.names import FAULTS
 
 from .comparators import PLAIN, take_step
 from .fit import fit
-from .model import CHANCE, DISTANT, FAR, Model, stripped
+from .model import CHANCE, DISTANT, FAR, Model, strip
 from .noise import Noise, Verdict
-from .ridge import nearest, walked, without_common
-from .screening import AT_LEAST, Screened, looking_like, promising, simulated, start_with
-from .verdicts import NEARLY, as_on_the_bench, at_the_minimum, begun_again, surely
+from .ridge import sort_by_nearness, subtract_common, walk_ridge
+from .screening import AT_LEAST, Screened, find_look_alikes, rank_by_simulation, rank_to_first_order, start_with
+from .verdicts import NEARLY, begin_again, judge_closely, settle_at_minimum, take_bench_conditions
 from .weighing import (
     SAME,
     SLACK,
@@ -49,21 +49,21 @@ NEARLY_ALL = 0.01  # share of what there was to explain, up to which a rival may
 NEAR_NOISE = 0.05  # excess below which a fit need not go on
 
 
-def grown(
+def add_effects(
     search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]]
 ) -> tuple[Model, Verdict]:
     """`after` with as many further effects as are real."""
     left = after.excess
     while not v.is_noise and len(set(after.names) - {"torque_line"}) < MAX_EFFECTS:  # a second line is no further cause
         enough = is_enough(after, before)
-        screened = promising(search, after)
-        models = extend(search, after, screened)
+        screened = rank_to_first_order(search, after)
+        models = fit_with_one_more(search, after, screened)
         needed = max(STRONG * after.excess, CHANCE) if enough else WORTH_IT * after.excess
-        real = _real(search, models, after, needed)
+        real = _keep_real(search, models, after, needed)
         if not real and needed <= after.excess < FAR:
-            real = _real(search, extend(search, after, screened, models), after, needed)
+            real = _keep_real(search, fit_with_one_more(search, after, screened, models), after, needed)
         if not real and enough:
-            real = _leaving_noise(search, models, after)
+            real = _keep_leaving_noise(search, models, after)
         if not real:
             break
         after, *rivals = [m for m in real if is_alike(m, real[0])]
@@ -80,16 +80,16 @@ def grown(
             real, noise = near, Noise(search.plant, after.fit.point)
         rivals = [m for m in rivals if is_alike(m, after) and not may_be_nothing(search, m, m.effects[-1])]
         alike.append(tuple(m.names[-1] for m in rivals))
-        after, v = surely(search, after, search.verdict(after))
+        after, v = judge_closely(search, after, search.verdict(after))
         if not v.is_noise:
-            after, v = as_on_the_bench(search, after, v, PLAIN)
+            after, v = take_bench_conditions(search, after, v, PLAIN)
         if not v.is_noise and after.excess < DISTANT:  # far from noise it is not what is flat that is missing
-            after, v = (at_the_minimum if after.excess < NEAR else begun_again)(search, after, v)
+            after, v = (settle_at_minimum if after.excess < NEAR else begin_again)(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
 
 
-def instead_of_all(
+def try_other_first_effects(
     search: Search, before: Model, model: Model, v: Verdict, alike: list[tuple[str, ...]]
 ) -> tuple[Model, Verdict]:
     """`model`, or one that begins with another first effect, simulated since first order had promised little of it.
@@ -99,13 +99,15 @@ def instead_of_all(
     if v.is_noise or before.excess >= FAR or is_enough(model, before):
         return model, v
     singly = [m for m in search.tried if len(m.effects) == 1]
-    found = _by_themselves(search, extend(search, before, promising(search, before), singly), before)
+    found = _keep_owed_to_last(
+        search, fit_with_one_more(search, before, rank_to_first_order(search, before), singly), before
+    )
     if not found or found[0].excess > CLOSE * model.excess:
         return model, v
     noise, step, late = search.noise, search.plant.step, search.plant.late
     sets: list[tuple[str, ...]] = [tuple(m.names[-1] for m in found[1:] if is_alike(m, found[0]))]
-    made, w = surely(search, found[0], search.verdict(found[0]))
-    made, w = grown(search, before, made, w, sets)
+    made, w = judge_closely(search, found[0], search.verdict(found[0]))
+    made, w = add_effects(search, before, made, w, sets)
     if not w.is_noise and made.excess > CLOSE * model.excess:
         search.noise, search.plant.late = noise, late
         take_step(search.plant, step)
@@ -115,7 +117,9 @@ def instead_of_all(
     return made, w
 
 
-def exchanged(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+def exchange_earlier_effects(
+    search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]
+) -> tuple[Model, Verdict]:
     """`model`, or one with another effect in place of an earlier one, which was chosen before the others were there."""
     for effect in model.effects[:-1]:
         place = model.effects.index(effect)
@@ -133,29 +137,29 @@ def exchanged(search: Search, model: Model, v: Verdict, alike: list[tuple[str, .
     return model, v
 
 
-def _real(search: Search, models: Sequence[Model], after: Model, needed: float) -> list[Model]:
+def _keep_real(search: Search, models: Sequence[Model], after: Model, needed: float) -> list[Model]:
     """Of models with one more effect than `after`, those in which it is real: credible, and the gain is its own."""
     gaining = [m for m in models if after.excess - m.excess >= needed]
-    return _by_themselves(search, gaining, after) or _with_own_noise(
+    return _keep_owed_to_last(search, gaining, after) or _weigh_by_own_noise(
         search, [m for m in models if m.heldout < after.heldout + SAME], after
     )
 
 
-def _by_themselves(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
+def _keep_owed_to_last(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
     """Models with a credible last effect to which they owe what they gain over `after`."""
     return [m for m in models if is_credible(m) and does_it(search, m, after)]
 
 
-def _leaving_noise(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
+def _keep_leaving_noise(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
     """Models that leave noise where `after` leaves hardly more, as no law of another form makes it.
 
     The misfit of noise itself is not one but for the noise that it was estimated from.
     """
     gaining = [m for m in models if after.heldout - m.heldout > 2.0 * CHANCE]
-    return [m for m in _by_themselves(search, gaining, after) if search.verdict(m).is_noise]
+    return [m for m in _keep_owed_to_last(search, gaining, after) if search.verdict(m).is_noise]
 
 
-def _with_own_noise(search: Search, models: list[Model], after: Model) -> list[Model]:
+def _weigh_by_own_noise(search: Search, models: list[Model], after: Model) -> list[Model]:
     """Of the likeliest models those that do better, when noise is estimated where they are, best first.
 
     What runs differ by depends on the point. Where faults stand for an effect, the noise there hides what the true
@@ -175,7 +179,9 @@ def _with_own_noise(search: Search, models: list[Model], after: Model) -> list[M
     return [m for m, _ in found]
 
 
-def extend(search: Search, model: Model, screened: Sequence[Screened], known: Sequence[Model] = ()) -> list[Model]:
+def fit_with_one_more(
+    search: Search, model: Model, screened: Sequence[Screened], known: Sequence[Model] = ()
+) -> list[Model]:
     """The best models with one more effect of those screened, best first.
 
     With `known`, those that first order has led to, candidates that are not among them are simulated instead.
@@ -183,33 +189,33 @@ def extend(search: Search, model: Model, screened: Sequence[Screened], known: Se
     tried = {m.names[-1] for m in known}
     screened = [s for s in screened if s.candidate.effect not in tried]
     if known or model.excess > FAR:
-        screened = simulated(search, model, screened)
-    refined = _for_several_faults(search, model, screened)
-    refined |= _likeliest(search, model, screened, refined)
+        screened = rank_by_simulation(search, model, screened)
+    refined = _fit_for_several_faults(search, model, screened)
+    refined |= _fit_most_promising(search, model, screened, refined)
     if not refined:
         return []
     best = min(refined.values(), key=lambda m: m.heldout)
     near = model.excess < FAR
-    for leader in _leaders(model, refined, best):
-        for s in looking_like(search, model, leader, screened, set(refined), only_there=near):
-            m = _instead(search, leader, s) if near else _refined(search, model, s, within_reach(leader))
+    for leader in _choose_leaders(model, refined, best):
+        for s in find_look_alikes(search, model, leader, screened, set(refined), only_there=near):
+            m = _fit_rival(search, leader, s) if near else _fit_candidate(search, model, s, within_reach(leader))
             effect = s.candidate.effect
             refined[effect] = min(m, refined.get(effect, m), key=lambda x: x.heldout)
     # A rival is out only if it leaves more when fitted as well as the best, or promises to.
-    for name, m in _close(refined, model):
+    for name, m in _find_near_best(refined, model):
         again = search.model(m.effects, m.fit.free, m.fit.point, None, 4, within_reach(best))
         refined[name] = min(m, again, key=lambda x: x.heldout)
     return sorted(refined.values(), key=lambda m: m.heldout)
 
 
-def _leaders(model: Model, refined: Mapping[str, Model], best: Model) -> list[Model]:
+def _choose_leaders(model: Model, refined: Mapping[str, Model], best: Model) -> list[Model]:
     """The best, and the best that stands for several faults if it does as well: from these no fit finds its rivals."""
     standing = [m for m in refined.values() if model.shows_faults_of(m.effects[-1]) and is_alike(m, best)]
     instead = min(standing, key=lambda m: m.heldout, default=best)
     return [best] if instead is best else [best, instead]
 
 
-def _for_several_faults(search: Search, model: Model, screened: Sequence[Screened]) -> dict[str, Model]:
+def _fit_for_several_faults(search: Search, model: Model, screened: Sequence[Screened]) -> dict[str, Model]:
     """One cause for several faults, tried whatever it promises, since the faults hide that.
 
     Unless another one, simulated far from the data, takes nearly all by itself. Once one leaves noise, the others are
@@ -218,16 +224,16 @@ def _for_several_faults(search: Search, model: Model, screened: Sequence[Screene
     if model.excess > FAR and screened[0].promised < NEARLY_ALL * _cost(model):
         return {}
     found: dict[str, Model] = {}
-    for s in nearest(search, model, [s for s in screened if model.shows_faults_of(s.candidate)]):
+    for s in sort_by_nearness(search, model, [s for s in screened if model.shows_faults_of(s.candidate)]):
         if s.candidate.effect not in found:
             best = min(found.values(), key=lambda m: m.heldout, default=None)
-            found[s.candidate.effect] = m = _refined(search, model, s, within_reach(best) if best else np.inf)
+            found[s.candidate.effect] = m = _fit_candidate(search, model, s, within_reach(best) if best else np.inf)
             if leaves_noise(search, m):
                 break
     return found
 
 
-def _likeliest(
+def _fit_most_promising(
     search: Search, model: Model, screened: Sequence[Screened], known: Mapping[str, Model]
 ) -> dict[str, Model]:
     """Those that promise most, one at least if none is known, until one leaves noise."""
@@ -239,11 +245,11 @@ def _likeliest(
     for s in screened:
         if (known or found) and cost - s.promised < worth:
             break
-        if len(found) >= N_REFINED or (found and _clear(search, found, s.promised)):
+        if len(found) >= N_REFINED or (found and _stands_alone(search, found, s.promised)):
             break
         if s.candidate.effect not in {*known, *found}:
             best = min(found.values(), key=lambda m: m.heldout, default=None)
-            found[s.candidate.effect] = m = _refined(search, model, s, within_reach(best) if best else np.inf)
+            found[s.candidate.effect] = m = _fit_candidate(search, model, s, within_reach(best) if best else np.inf)
             if leaves_noise(search, m):
                 break
     return found
@@ -253,13 +259,13 @@ def _cost(model: Model) -> float:
     return sum(float(r @ r) for r in model.fit.residuals.values())
 
 
-def _refined(search: Search, model: Model, s: Screened, to_beat: float = np.inf) -> Model:
+def _fit_candidate(search: Search, model: Model, s: Screened, to_beat: float = np.inf) -> Model:
     frees = (*model.fit.free, *s.candidate.frees)
     start, cost = search.better([s.start, start_with(search, model, s.candidate, dict.fromkeys(FAULTS, 0.0))], model)
     if model.shows_faults_of(s.candidate):
         # One effect for several faults, or for what they have in common, is the simpler cause; noise in the
         # columns would leave the faults there.
-        less = (dict.fromkeys(s.candidate.faults, 0.0), without_common(model, s.candidate))
+        less = (dict.fromkeys(s.candidate.faults, 0.0), subtract_common(model, s.candidate))
         nearer, _ = search.better([start_with(search, model, s.candidate, rest) for rest in less], model)
         # From there the effect alone goes as far as it can.
         alone = fit(search.plant, search.noise, s.candidate.frees, nearer, search.train, n_iterations=3)
@@ -268,17 +274,17 @@ def _refined(search: Search, model: Model, s: Screened, to_beat: float = np.inf)
             start = simpler
     made = search.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3, to_beat)
     may_be_walked = model.shows_faults_of(s.candidate) and not made.fit.given_up
-    return walked(search, model, made, s.candidate) if may_be_walked else made
+    return walk_ridge(search, model, made, s.candidate) if may_be_walked else made
 
 
-def _instead(search: Search, best: Model, s: Screened) -> Model:
+def _fit_rival(search: Search, best: Model, s: Screened) -> Model:
     """A rival in the place of the last effect of `best`, begun from where that is."""
-    effects, frees, _ = stripped(best, best.effects[-1])
+    effects, frees, _ = strip(best, best.effects[-1])
     free = (*frees, *s.candidate.frees)
     return search.model((*effects, s.candidate), free, s.start, best.fit.columns, 3, within_reach(best))
 
 
-def _close(refined: dict[str, Model], model: Model) -> list[tuple[str, Model]]:
+def _find_near_best(refined: dict[str, Model], model: Model) -> list[tuple[str, Model]]:
     """The models near the best, by what there was to explain too; none if the best stands alone without a rest."""
     ranked = sorted(refined.items(), key=lambda item: item[1].heldout)
     best = ranked[0][1]
@@ -287,7 +293,7 @@ def _close(refined: dict[str, Model], model: Model) -> list[tuple[str, Model]]:
     return near if len(near) > 1 or best.excess > NEAR_NOISE else []
 
 
-def _clear(search: Search, refined: dict[str, Model], promised: float) -> bool:
+def _stands_alone(search: Search, refined: dict[str, Model], promised: float) -> bool:
     """Whether one leaves nearly nothing, and what is left to try promises far less."""
     n = sum(len(search.plant.data.y[c]) for c in search.train)
     reached = min(m.fit.misfit for m in refined.values())

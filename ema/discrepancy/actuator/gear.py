@@ -110,7 +110,7 @@ def _user(shaft: Array, start: Array, gear: Gear, T: float) -> Array:
     return out
 
 
-def swinging(data: Measured, found: Resonance | None) -> Measured:
+def start_swinging(data: Measured, found: Resonance | None) -> Measured:
     """The cycles with the user starting as a gear that gives lets it, which no parabola tells; as they are if stiff."""
     if found is None:
         return data
@@ -118,7 +118,7 @@ def swinging(data: Measured, found: Resonance | None) -> Measured:
     return replace(data, start=start, user_speed=found.starts[:, 1])
 
 
-def resonance(plant: Actuator, data: Measured) -> Resonance | None:
+def find_resonance(plant: Actuator, data: Measured) -> Resonance | None:
     """The likeliest resonance of the gear train, None where a stiff one explains the user as well."""
     T = 1.0 / plant.control.rate
     users = [s.theta_u[0] for s in data.signals]
@@ -191,11 +191,11 @@ def _gear(
         best, left = gear(found.x), float(found.fun)
         if left > least:
             return None
-        starts = np.array([_started(*of, best, T) for of in zip(shafts, users, starts, strict=True)])
+        starts = np.array([_fit_start(*of, best, T) for of in zip(shafts, users, starts, strict=True)])
     return None if back != NONE and not best.rings else (best, starts, left)
 
 
-def _started(shaft: Array, user: Array, start: Array, gear: Gear, T: float) -> Array:
+def _fit_start(shaft: Array, user: Array, start: Array, gear: Gear, T: float) -> Array:
     """θ_u and ω_u with which the first swing comes out as recorded."""
     n = round(FIRST_SWING / gear.w_0 / T)
     solved = least_squares(

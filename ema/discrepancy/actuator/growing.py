@@ -42,13 +42,13 @@ def is_steady(search: Search, model: Model) -> bool:
     return _differ(search, residuals(search.plant, search.noise, model.fit.point, cycles, N_SEEDS)) < DIFFER
 
 
-def growing(search: Search, model: Model) -> Array | None:
+def find_growing_faults(search: Search, model: Model) -> Array | None:
     """Faults of each cycle, shape (n_cycles, 6), if these explain what cycles of one motion differ by."""
     if is_steady(search, model):
         return None
     search.say("cycles of one motion differ: faults of each")
     cycles = range(search.plant.data.n_cycles)
-    fits = _each(search, model.fit)
+    fits = _fit_each_cycle(search, model.fit)
     left = {c: fitted.residuals[c] for c, fitted in zip(cycles, fits, strict=True)}
     faults = _faults(search, fits)
     if _differ(search, left) >= DIFFER or (_is_warming(search) and np.ptp(faults, axis=0).max() < TOLD):
@@ -56,28 +56,28 @@ def growing(search: Search, model: Model) -> Array | None:
     return faults
 
 
-def beside(search: Search, model: Model) -> Array:
+def find_faults_beside(search: Search, model: Model) -> Array:
     """Faults of each cycle beside the effects of `model`, shape (n_cycles, 6)."""
-    return _faults(search, _each(search, model.fit))
+    return _faults(search, _fit_each_cycle(search, model.fit))
 
 
 def _is_warming(search: Search) -> bool:
     return bool(np.ptp(search.plant.data.dT) > WARMER)
 
 
-def _each(search: Search, of_all: Fit) -> list[Fit]:
+def _fit_each_cycle(search: Search, of_all: Fit) -> list[Fit]:
     """Faults of each cycle; where it becomes warmer, beside a magnet that goes with that."""
-    fits = [_of_one(search, of_all, c) for c in range(search.plant.data.n_cycles)]
+    fits = [_fit_one_cycle(search, of_all, c) for c in range(search.plant.data.n_cycles)]
     more = _flux_per_kelvin(search, of_all, fits) if _is_warming(search) else 0.0
     if not more:
         return fits
     per_kelvin = of_all.point.get(PER_KELVIN, 0.0) + more
     search.say(f"beside a magnet that changes by {per_kelvin:.2%} per kelvin: faults of each anew")
     warmer = replace(of_all, point={**of_all.point, PER_KELVIN: per_kelvin})
-    return [_of_one(search, warmer, c) for c in range(search.plant.data.n_cycles)]
+    return [_fit_one_cycle(search, warmer, c) for c in range(search.plant.data.n_cycles)]
 
 
-def _of_one(search: Search, of_all: Fit, cycle: int) -> Fit:
+def _fit_one_cycle(search: Search, of_all: Fit, cycle: int) -> Fit:
     """Faults of one cycle, with the columns of its motion."""
     motion = int(search.plant.data.motion[cycle])
     known = {key: column for key, column in of_all.columns.items() if key[0] == motion}
@@ -115,7 +115,7 @@ def _faults(search: Search, fits: Sequence[Fit]) -> Array:
     return np.array([_beyond(own, of.point) for own, of in zip(search.plant.data.faults, fits, strict=True)])
 
 
-def widened(search: Search, model: Model) -> Model:
+def widen(search: Search, model: Model) -> Model:
     """`model` with deviations of its effects that know of faults which are free in every cycle, where they are seen.
 
     Faults are never negative, so what noise makes of those that are not there does not vanish in the mean: what shorts
@@ -152,7 +152,7 @@ def _beyond(faults: Array, point: Point) -> Array:
     return np.clip(faults + [point.get(name, 0.0) for name in FAULTS], 0.0, 1.0)
 
 
-def said(faults: Array, point: Point) -> str:
+def describe(faults: Array, point: Point) -> str:
     """The sentence for faults of each cycle, shape (n_cycles, 6), beyond those of a point."""
     k = _beyond(faults, point)
     ranges = [

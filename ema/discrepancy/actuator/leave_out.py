@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.records import Array
-from ema.discrepancy.folds import Folds, dealt
+from ema.discrepancy.folds import Folds, deal
 from ema.discrepancy.plant import Point
 
-from .fit import SEED, bounded, bounds, columns, moved, residuals, stacked_jacobian
+from .fit import SEED, bounds, columns, residuals, solve_within_bounds, stacked_jacobian, step_to
 from .model import FINAL_SEED, N_FINAL, N_GLANCE, Model
 from .plant import ENVELOPE_STEP, EmaPlant
 
@@ -52,8 +52,8 @@ class _Linear:
         """Where one step of Gauss–Newton from the point leads that fits it to some cycles."""
         frees, point = self.model.fit.free, self.model.fit.point
         J, r = (np.concatenate([of[c] for c in cycles]) for of in (self.J, self.r))
-        step, _ = bounded(J, r, *bounds(frees, point))
-        return moved(point, frees, step)
+        step, _ = solve_within_bounds(J, r, *bounds(frees, point))
+        return step_to(point, frees, step)
 
 
 def _fitted(search: Search, of: list[tuple[_Linear, list[int]]]) -> list[Point]:
@@ -81,7 +81,7 @@ def over_folds(search: Search, before: Model, after: Model) -> tuple[Folds, Fold
     models = [before] if after is before else [before, after]
     squares: list[dict[int, float]] = [{} for _ in models]
     residual: list[dict[int, float]] = [{} for _ in models]
-    parts = dealt(cycles, N_FOLDS)
+    parts = deal(cycles, N_FOLDS)
     linear = [_Linear.of(search, m, cycles) for m in models]
     points = _fitted(search, [(m, [c for c in cycles if c not in part]) for m in linear for part in parts])
     turns = [(of, whitened, part) for of, whitened in zip(squares, residual, strict=True) for part in parts]

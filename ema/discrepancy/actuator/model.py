@@ -50,7 +50,7 @@ class Model:
         return len(faults) > 1 and all(self.fit.point.get(name, 0.0) > K_SEEN for name in faults)
 
 
-def stripped(model: Model, effect: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:
+def strip(model: Model, effect: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:
     """Effects, free parameters and point of a model without one of its effects."""
     own = {f.name for f in effect.frees}
     point = {name: x for name, x in model.fit.point.items() if not name.startswith(f"{effect.effect}.")}

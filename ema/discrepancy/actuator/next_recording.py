@@ -13,7 +13,7 @@ from ema.core.records import Array, Cycle, Record
 from ema.models import hf
 
 from .comparators import take_step
-from .cycles import measured
+from .cycles import prepare
 from .fit import columns, stacked_jacobian
 from .model import Model
 from .motions import Motion, motions
@@ -143,6 +143,6 @@ def _made(plant: EmaPlant, motion: Motion) -> EmaPlant:
     }  # fmt: skip
     if old.signals[0].u_dc is not None:
         channels["u_dc"] = r.u_dc[0]
-    made = EmaPlant(plant.plant, measured(plant.plant, [Record((Cycle(0, channels),))]), plant.n_threads)
+    made = EmaPlant(plant.plant, prepare(plant.plant, [Record((Cycle(0, channels),))]), plant.n_threads)
     take_step(made, plant.step)
     return made

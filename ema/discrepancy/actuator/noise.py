@@ -14,7 +14,7 @@ from ema.discrepancy.engine.hypothesis import Point
 from ema.discrepancy.engine.statistic import Root
 
 from .runs import Runs
-from .thinning import spread
+from .thinning import choose_evenly
 
 if TYPE_CHECKING:
     from .measured import Measured
@@ -58,11 +58,11 @@ class MotionNoise:
 
 def _repeats(plant: EmaPlant, motion: int, n_runs: tuple[int, int]) -> tuple[list[int], int]:
     """Cycles of a motion that are simulated for its noise, and how often each."""
-    cycles: list[int] = spread(np.flatnonzero(plant.data.motion == motion), N_CYCLES).tolist()
+    cycles: list[int] = choose_evenly(np.flatnonzero(plant.data.motion == motion), N_CYCLES).tolist()
     return cycles, -(-sum(n_runs) // len(cycles))
 
 
-def _simulated(plant: EmaPlant, point: Point, n_runs: tuple[int, int]) -> list[Runs]:
+def _simulate(plant: EmaPlant, point: Point, n_runs: tuple[int, int]) -> list[Runs]:
     """Runs of every motion, cycle by cycle: motions that last as long share batches of lanes."""
     repeats = [_repeats(plant, motion, n_runs) for motion in range(plant.n_motions)]
     found: dict[int, Runs] = {}
@@ -78,7 +78,7 @@ def _simulated(plant: EmaPlant, point: Point, n_runs: tuple[int, int]) -> list[R
     return [found[m] for m in range(plant.n_motions)]
 
 
-def motion_noise(plant: EmaPlant, motion: int, runs: Runs, n_runs: tuple[int, int]) -> MotionNoise:
+def measure_motion_noise(plant: EmaPlant, motion: int, runs: Runs, n_runs: tuple[int, int]) -> MotionNoise:
     """How runs of one cycle of a motion differ.
 
     Beside what is random stands what no record tells: the grid on which the comparators are evaluated. It rounds every
@@ -108,8 +108,8 @@ class Noise:
 
     def __init__(self, plant: EmaPlant, point: Point, n_runs: tuple[int, int] = N_RUNS):
         self.plant, self.point = plant, dict(point)
-        runs = _simulated(plant, point, n_runs)
-        self.motions = [motion_noise(plant, m, of, n_runs) for m, of in enumerate(runs)]
+        runs = _simulate(plant, point, n_runs)
+        self.motions = [measure_motion_noise(plant, m, of, n_runs) for m, of in enumerate(runs)]
 
     def of(self, cycle: int) -> MotionNoise:
         """Noise of the motion a cycle belongs to."""
@@ -180,7 +180,7 @@ class Verdict:
         return max(self.scores, key=lambda name: self.scores[name])
 
 
-def verdict(
+def judge(
     noise: Noise, residuals: Sequence[Array], cycles: Sequence[int], columns: Sequence[Array], extra: float
 ) -> Verdict:
     """Test whitened residuals of cycles, group by group, against runs of the fitted simulation itself.

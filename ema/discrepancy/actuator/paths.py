@@ -9,15 +9,15 @@ from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
 from .comparators import PLAIN, take_step
-from .forward import CLOSE, exchanged, grown, instead_of_all
+from .forward import CLOSE, add_effects, exchange_earlier_effects, try_other_first_effects
 from .growing import is_steady
 from .model import CHANCE, DISTANT, Model
 from .noise import Noise, Verdict
 from .plant import EmaPlant
 from .search import Search, start_model
-from .simpler import simpler
-from .timing import samples_late
-from .verdicts import FAULT_ALARM, NEARLY, as_on_the_bench, surely
+from .simpler import simplify
+from .timing import find_samples_late
+from .verdicts import FAULT_ALARM, NEARLY, judge_closely, take_bench_conditions
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Path:
         return cls(search.noise, plant.step, plant.late, list(search.tried), model, v, model, v, [], [])
 
 
-def with_faults(search: Search, of_each: Array, point: Point) -> Search:
+def begin_with_faults(search: Search, of_each: Array, point: Point) -> Search:
     """A search from the beginning with faults of each cycle, shape (n_cycles, 6), and noise as at their mean."""
     mean = of_each.mean(axis=0)
     old = search.plant
@@ -58,7 +58,7 @@ def with_faults(search: Search, of_each: Array, point: Point) -> Search:
     return Search(plant, noise, search.train, search.heldout, search.say)
 
 
-def gone_on(search: Search, path: Path) -> Path:
+def go_on(search: Search, path: Path) -> Path:
     """A path to its end from the effects that were found, after the cycles' faults were found anew beside them.
 
     Odds stay those of what was tried beside the same faults.
@@ -67,10 +67,10 @@ def gone_on(search: Search, path: Path) -> Path:
     after = search.model(path.after.effects, path.after.fit.free, search.noise.point, None, 4)
     v, known = search.verdict(after), Path.of(search, before)
     begun = replace(known, tried=path.tried, after=after, verdict=v, alike=path.alike, as_well=path.as_well)
-    return _gone(search, begun)
+    return _go(search, begun)
 
 
-def beside_steady(search: Search, path: Path) -> Path | None:
+def retry_with_steady_faults(search: Search, path: Path) -> Path | None:
     """A path found beside faults of each cycle, gone to its end beside steady ones if with its effects these will do.
 
     What is missing in a simulation may make cycles of one motion differ by more than its noise.
@@ -81,10 +81,10 @@ def beside_steady(search: Search, path: Path) -> Path | None:
     if not is_steady(search, model):
         return None
     search.say("beside what was found, cycles of one motion differ by chance alone")
-    return gone_on(search, replace(path, after=model))
+    return go_on(search, replace(path, after=model))
 
 
-def faults_only(search: Search, faults: Point) -> list[Path]:
+def begin_with_faults_alone(search: Search, faults: Point) -> list[Path]:
     """Paths that begin with faults alone, from where these are expected.
 
     What faults make of the noise weighs what tells them; both are found in turn.
@@ -93,7 +93,7 @@ def faults_only(search: Search, faults: Point) -> list[Path]:
     without faults, or what they make of it: friction or drag, whatever their cause, change it hundredfold.
     """
     model = start_model(search, faults)
-    late = samples_late(search.plant, search.noise, model.fit.point, search.train) if model.excess > NEARLY else 0
+    late = find_samples_late(search.plant, search.noise, model.fit.point, search.train) if model.excess > NEARLY else 0
     if late:
         search.plant.late = late
         model = start_model(search, faults)
@@ -112,14 +112,14 @@ def faults_only(search: Search, faults: Point) -> list[Path]:
         model = search.model((), model.fit.free, model.fit.point, None, 6)
 
 
-def shortest(search: Search, paths: list[Path]) -> Path:
+def choose_path(search: Search, paths: list[Path]) -> Path:
     """The first path that leaves next to nothing, or else the one that leaves least by the noise of both."""
-    best = _gone(search, paths[0])
+    best = _go(search, paths[0])
     for path in paths[1:]:
         if best.verdict.is_noise or best.after.excess < CHANCE:
             break
         search.say("again, with the noise that faults alone make")
-        other = _gone(search, path)
+        other = _go(search, path)
         if search.left_more(other.after, best.after, (other.noise, best.noise)) < 0.0:
             best = other
     return best
@@ -132,26 +132,26 @@ def resume(search: Search, path: Path) -> None:
     search.plant.late = path.late
 
 
-def _gone(search: Search, begun: Path) -> Path:
+def _go(search: Search, begun: Path) -> Path:
     """A path to its end: what explains the cycles."""
     resume(search, begun)
-    before, verdict_before = surely(search, begun.before, begun.verdict_before)
+    before, verdict_before = judge_closely(search, begun.before, begun.verdict_before)
     if not verdict_before.is_noise and not begun.after.effects:
-        before, verdict_before = as_on_the_bench(search, before, verdict_before, PLAIN)
+        before, verdict_before = take_bench_conditions(search, before, verdict_before, PLAIN)
     search.say(f"faults only: p = {verdict_before.p_value:.2g}, most visible: {verdict_before.loudest}")
     alike, as_well = list(begun.alike), list(begun.as_well)
     after, v = (begun.after, begun.verdict) if begun.after.effects else (before, verdict_before)
-    after, v = grown(search, before, after, v, alike)
+    after, v = add_effects(search, before, after, v, alike)
     if not v.is_noise:
-        after, v = exchanged(search, after, v, alike)
+        after, v = exchange_earlier_effects(search, after, v, alike)
     if not v.is_noise:  # the library had its chance
-        other, w = as_on_the_bench(search, after, v)
+        other, w = take_bench_conditions(search, after, v)
         if other is not after:
             if after is before:
                 before, verdict_before = other, w
-            after, v = grown(search, before, other, w, alike)
-    after, v = instead_of_all(search, before, after, v, alike)
+            after, v = add_effects(search, before, other, w, alike)
+    after, v = try_other_first_effects(search, before, after, v, alike)
     if verdict_before.is_noise:
-        after, v = simpler(search, before, after, v, alike, as_well)
+        after, v = simplify(search, before, after, v, alike, as_well)
     plant = search.plant
     return Path(search.noise, plant.step, plant.late, search.tried, before, verdict_before, after, v, alike, as_well)

@@ -19,7 +19,7 @@ from .features import GROUPS, SECTORS
 from .leave_out import settled
 from .model import FINAL_SEED, N_FINAL
 from .plant import ENVELOPE_STEP
-from .thinning import spread
+from .thinning import choose_evenly
 from .weak import ORDERS, Torque, line, share_explained, torque
 
 N_SHOWN = 3  # cycles side by side
@@ -45,7 +45,7 @@ def _shown(e: Examination) -> list[int]:
     """A held-out cycle of each motion that has one; of many motions a few, spread over the record."""
     motions = e.search.plant.data.motion
     first = {int(motions[c]): c for c in reversed(e.search.heldout)}
-    return spread(np.array(sorted(first.values())), N_SHOWN).tolist()
+    return choose_evenly(np.array(sorted(first.values())), N_SHOWN).tolist()
 
 
 def _title(label: str) -> str:

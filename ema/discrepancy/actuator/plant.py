@@ -23,8 +23,8 @@ from .features import Signals, features, floors, slices, stacked
 from .gear import Resonance
 from .measured import Measured
 from .runs import Asked, Memory, Runs, Work
-from .sampling import straightened
-from .supply import resolved
+from .sampling import straighten
+from .supply import resolve
 
 Steps = tuple[float, ...] | None  # None: the plant's
 STEPS = (1e-6, 8e-7)  # [s] integration steps of a mean
@@ -62,7 +62,7 @@ class EmaPlant:
         self.slices = [slices(g) for g in groups]
         self.floors = [floors(g) for g in groups]
         supply = [at["supply"] for at in self.slices if "supply" in at]
-        trusted = resolved(data, supply) if supply else None
+        trusted = resolve(data, supply) if supply else None
         if trusted is not None:
             for floor, of in zip(self.floors, supply, strict=True):
                 floor[of] = trusted
@@ -156,7 +156,7 @@ class EmaPlant:
         if d.angle_step:
             theta_m = d.angle_step * np.round(theta_m / d.angle_step)
         u_dc = r.u_dc if d.signals[cycles[0]].u_dc is not None else None
-        theta_m, theta_u = (straightened(x, d.every) for x in (theta_m, r.theta_u))
+        theta_m, theta_u = (straighten(x, d.every) for x in (theta_m, r.theta_u))
         signals = Signals(r.i, theta_m, theta_u, recorded, u_dc)
         return Runs(stacked(features(self.plant, signals)), r.envelope[:, ::ENVELOPE_STEP])
 

@@ -38,12 +38,12 @@ class Pressed(NamedTuple):
     holds: float
 
 
-def as_held(plant: Actuator, data: Measured) -> tuple[Actuator, Measured]:
+def take_hold_of_user(plant: Actuator, data: Measured) -> tuple[Actuator, Measured]:
     """Plant and cycles, with a user that its load moves within the play where the record shows that.
 
     The middle of the play is not seen then, so zeros of sensors that lie apart are not told from it.
     """
-    found = pressed(plant, data) if plant.transmission.F_u is None else None
+    found = find_pressing_load(plant, data) if plant.transmission.F_u is None else None
     if found is None:
         return plant, data
     F_u = float(f"{abs(_stiffness(plant, data)) * found.holds:.3g}") if found.holds else 0.0
@@ -51,7 +51,7 @@ def as_held(plant: Actuator, data: Measured) -> tuple[Actuator, Measured]:
     return plant.model_copy(update={"transmission": transmission}), replace(data, zero=0.0)
 
 
-def with_friction(stated: Actuator, taken: Actuator, findings: Findings) -> Findings:
+def add_user_friction(stated: Actuator, taken: Actuator, findings: Findings) -> Findings:
     """The findings, with the friction at the user that the load they name overcomes, for extended.yaml."""
     F_u = taken.transmission.F_u
     if F_u == stated.transmission.F_u or not LOADS & {e.name for e in findings.effects}:
@@ -63,7 +63,7 @@ def with_friction(stated: Actuator, taken: Actuator, findings: Findings) -> Find
     return replace(findings, fitted={**findings.fitted, "transmission": taken.transmission.model_dump()})
 
 
-def pressed(plant: Actuator, data: Measured) -> Pressed | None:
+def find_pressing_load(plant: Actuator, data: Measured) -> Pressed | None:
     """How a load presses the user to one side; None where the play operator leaves no more of the recorded gap."""
     g = plant.transmission
     m = spacing(GROUPS["gap"][0], plant.control.rate, len(data.signals[0].theta_u[0]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ema.discrepancy.folds import Folds
-from ema.discrepancy.grade import Left, Verdict, graded
+from ema.discrepancy.grade import Left, Verdict, grade
 
 from .candidates import Candidate
 from .leave_out import over_folds
@@ -62,7 +62,7 @@ def remains(
         error_alone, residual_alone = over_folds(search, before, alone)
         is_chance = search.verdict(alone).is_noise
         left = Left(is_chance, error_alone, residual_alone, is_enough(alone, before))
-    verdict = graded(left, named=named)
+    verdict = grade(left, named=named)
     if verdict in ("adequate", "explained") and alone is not told:
         told, error = alone, left.error
     return Remains(verdict, told, error, left)

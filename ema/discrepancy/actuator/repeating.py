@@ -38,7 +38,7 @@ def repeating(search: Search, point: Point) -> float | None:
     return common / own if own > 0.0 else None
 
 
-def said(share: float | None) -> list[str]:
+def describe(share: float | None) -> list[str]:
     """One sentence, where most of the rest does not repeat."""
     if share is None or share > SELDOM:
         return []

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 N_SHARES = 8  # of the ridge
 
 
-def walked(search: Search, model: Model, made: Model, effect: Candidate) -> Model:
+def walk_ridge(search: Search, model: Model, made: Model, effect: Candidate) -> Model:
     """`made`, which is `model` with an effect that several of its faults can stand for, or one that leaves less.
 
     The other one is fitted from the lowest point of the ridge, if that is lower than where `made` ended.
@@ -65,7 +65,7 @@ def _ridge(search: Search, model: Model, effect: Candidate) -> list[Point]:
     return [at((1.0 + j) / N_SHARES) for j in range(N_SHARES)]
 
 
-def nearest(search: Search, model: Model, screened: Sequence[Screened]) -> list[Screened]:
+def sort_by_nearness(search: Search, model: Model, screened: Sequence[Screened]) -> list[Screened]:
     """Those that can stand for what several faults have in common, the one first that leaves least of that.
 
     Simulated with the common part gone, and the effect as large as first order says: near the data an effect must do
@@ -73,7 +73,7 @@ def nearest(search: Search, model: Model, screened: Sequence[Screened]) -> list[
     """
     if not screened:
         return []
-    less = [without_common(model, s.candidate) for s in screened]
+    less = [subtract_common(model, s.candidate) for s in screened]
     ends = [start_with(search, model, s.candidate, rest) for s, rest in zip(screened, less, strict=True)]
     points = [model.fit.point, *ends, *({**model.fit.point, **rest} for rest in less)]
     far = model.excess > FAR
@@ -84,7 +84,7 @@ def nearest(search: Search, model: Model, screened: Sequence[Screened]) -> list[
     return [s for share, s in ranked if far or share < 1.0 - COLLINEAR**2]
 
 
-def without_common(model: Model, effect: Candidate) -> Point:
+def subtract_common(model: Model, effect: Candidate) -> Point:
     """The faults that an effect can be mistaken for, less what they have in common."""
     k = model.fit.point
     common = min(k[name] for name in effect.faults)

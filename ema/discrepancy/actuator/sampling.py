@@ -21,7 +21,7 @@ def positions_every(theta_m: Array) -> int:
     return 1
 
 
-def straightened(x: Array, every: int) -> Array:
+def straighten(x: Array, every: int) -> Array:
     """Signals (n, n_times) as such a record has them: straight lines between every so many samples."""
     if every == 1:
         return x

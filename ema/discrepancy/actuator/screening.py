@@ -12,9 +12,9 @@ from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
 from .candidates import Candidate, candidates
-from .fit import SEED, bounded, bounds, moved, residuals, stacked_jacobian
+from .fit import SEED, bounds, residuals, solve_within_bounds, stacked_jacobian, step_to
 from .free import Free
-from .model import FAR, N_GLANCE, N_GLANCE_FAR, Model, stripped
+from .model import FAR, N_GLANCE, N_GLANCE_FAR, Model, strip
 from .weighing import within_reach
 
 if TYPE_CHECKING:
@@ -38,16 +38,16 @@ class Screened(NamedTuple):
     start: Point
 
 
-def promising(search: Search, model: Model) -> list[Screened]:
+def rank_to_first_order(search: Search, model: Model) -> list[Screened]:
     """All that may stand beside the effects of `model`, by what it promises to first order."""
     line = "torque_line" if "cogging" in model.names else "cogging"
     found = candidates(search.plant.plant, search.plant.data, search.torques(model), line, search.plant.resonance)
-    return _screened(search, model, [c for c in found if c.effect not in model.names])
+    return _rank(search, model, [c for c in found if c.effect not in model.names])
 
 
-def _screened(search: Search, model: Model, found: Sequence[Candidate]) -> list[Screened]:
+def _rank(search: Search, model: Model, found: Sequence[Candidate]) -> list[Screened]:
     """What each candidate promises to first order next to all that `model` has free, best first."""
-    found = probed(search, found)
+    found = probe(search, found)
     f = model.fit
     own = stacked_jacobian(search.noise, f.free, f.columns, search.train)
     r = np.concatenate([f.residuals[c] for c in search.train])
@@ -56,24 +56,24 @@ def _screened(search: Search, model: Model, found: Sequence[Candidate]) -> list[
     for c in found:
         J = columns_of(search, c)
         c_low, c_high = c.limits()
-        step, promised = bounded(
+        step, promised = solve_within_bounds(
             np.concatenate([own, J], axis=1), r, np.concatenate([low, c_low]), np.concatenate([high, c_high])
         )
-        start = {**moved(f.point, f.free, step[: len(f.free)]), **c.start(step[len(f.free) :])}
+        start = {**step_to(f.point, f.free, step[: len(f.free)]), **c.start(step[len(f.free) :])}
         ranked.append(Screened(promised, c, start))
     ranked = [s for s in ranked if not any(_does_as_well(t, s, AT_LEAST * float(r @ r)) for t in ranked)]
     return sorted(ranked, key=lambda entry: entry.promised)
 
 
-def probed(search: Search, found: Sequence[Candidate]) -> list[Candidate]:
+def probe(search: Search, found: Sequence[Candidate]) -> list[Candidate]:
     """Fill in the columns (per unit) of what was not probed before; what is hardly felt comes with longer steps."""
     new = [c for c in found if c.key not in search.probed]
-    hidden = _probe(search, new, N_PROBE)
-    _probe(search, [c.wider(WIDER) for c in new if c.key in hidden], N_PROBE_HIDDEN)
+    hidden = _simulate_probes(search, new, N_PROBE)
+    _simulate_probes(search, [c.wider(WIDER) for c in new if c.key in hidden], N_PROBE_HIDDEN)
     return [search.probed[c.key] for c in found]
 
 
-def _probe(search: Search, found: Sequence[Candidate], n_seeds: int) -> set[str]:
+def _simulate_probes(search: Search, found: Sequence[Candidate], n_seeds: int) -> set[str]:
     """Simulate probes; keys of candidates whose columns are mostly noise, as two halves of the seeds tell."""
     if not found:
         return set()
@@ -106,10 +106,10 @@ def _starts_with(search: Search, model: Model, found: Sequence[Candidate], fault
     point = {**model.fit.point, **faults}
     left = residuals(search.plant, search.noise, point, search.train, N_GLANCE)
     r = np.concatenate([left[cycle] for cycle in search.train])
-    return [{**point, **c.start(bounded(columns_of(search, c), r, *c.limits())[0])} for c in found]
+    return [{**point, **c.start(solve_within_bounds(columns_of(search, c), r, *c.limits())[0])} for c in found]
 
 
-def simulated(search: Search, model: Model, screened: Sequence[Screened]) -> list[Screened]:
+def rank_by_simulation(search: Search, model: Model, screened: Sequence[Screened]) -> list[Screened]:
     """Candidates by what their starts leave when simulated, where first order promises little.
 
     So far from the data, where faults stand for anything. Near it first order misses what has a threshold, as dead time
@@ -149,7 +149,7 @@ def _does_as_well(simpler: Screened, s: Screened, hardly: float) -> bool:
     return simpler.candidate.effect == s.candidate.effect and fewer and simpler.promised < s.promised + hardly
 
 
-def looking_like(
+def find_look_alikes(
     search: Search,
     model: Model,
     best: Model,
@@ -171,7 +171,7 @@ def looking_like(
     frees = [f for f in best.fit.free if f.name in names]
     done = stacked_jacobian(search.noise, frees, best.fit.columns, search.train) @ values
     replaced = effect.faults if model.shows_faults_of(effect) else []
-    others, rest = stripped(best, effect)[1:]
+    others, rest = strip(best, effect)[1:]
     free, others = (tuple(f for f in of if f.name not in replaced) for of in (model.fit.free, others))
     own = stacked_jacobian(search.noise, free, model.fit.columns, search.train)
     own_there = stacked_jacobian(search.noise, others, best.fit.columns, search.train)
@@ -182,19 +182,19 @@ def looking_like(
         c = s.candidate
         if c.effect in found or c.effect == effect.effect or (c.effect in fitted and not replaced):
             continue
-        share = _doing(done, columns_of(search, c), own)
+        share = _share_done_by(done, columns_of(search, c), own)
         if share > COLLINEAR and c.effect not in fitted and not only_there:
             found[c.effect] = s
         elif share > RESEMBLING:
             J = _columns_at(search, best.fit.point, c)
-            if _doing(done, J, own_there) > COLLINEAR:
+            if _share_done_by(done, J, own_there) > COLLINEAR:
                 limits = zip(bounds(others, rest), c.limits(), strict=True)
                 low, high = (np.concatenate(ends) for ends in limits)
                 there = np.concatenate([own_there, J], axis=1)
-                step, _ = bounded(there, done, low, high)
+                step, _ = solve_within_bounds(there, done, low, high)
                 if only_there and np.linalg.norm(left + done - there @ step) > beaten:
                     continue
-                start = {**moved(rest, others, step[: len(others)]), **c.start(step[len(others) :])}
+                start = {**step_to(rest, others, step[: len(others)]), **c.start(step[len(others) :])}
                 found[c.effect] = s._replace(start=start)
     return list(found.values())
 
@@ -213,7 +213,7 @@ def _columns_at(search: Search, point: Point, c: Candidate) -> Array:
     return stacked_jacobian(search.noise, names, cols, search.train)
 
 
-def _doing(done: Array, columns: Array, own: Array) -> float:
+def _share_done_by(done: Array, columns: Array, own: Array) -> float:
     """What share of something columns can do beside others."""
     Q, _ = np.linalg.qr(own)
     done, columns = (x - Q @ (Q.T @ x) for x in (done, columns))

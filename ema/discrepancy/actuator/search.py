@@ -12,11 +12,11 @@ from ema.discrepancy.plant import Point
 from ema.discrepancy.progress import Progress
 
 from .candidates import Candidate
-from .fit import N_SEEDS, SEED, Columns, Fit, columns, fit, residuals, residuals_at, with_short_steps
-from .flat import settled
+from .fit import N_SEEDS, SEED, Columns, Fit, columns, fit, refit_with_short_steps, residuals, residuals_at
+from .flat import settle
 from .free import K_FREE, Free
-from .model import FAR, FINAL_SEED, N_FINAL, N_GLANCE, Model, stripped
-from .noise import Noise, Verdict, verdict
+from .model import FAR, FINAL_SEED, N_FINAL, N_GLANCE, Model, strip
+from .noise import Noise, Verdict, judge
 from .plant import EmaPlant, Steps
 from .weak import Torque, torque
 
@@ -56,9 +56,9 @@ class Search:
 
     def settled(self, model: Model) -> Model:
         """`model` at its minimum, along what the record hardly feels too."""
-        fitted = settled(self.plant, self.noise, model.fit, self.train)
+        fitted = settle(self.plant, self.noise, model.fit, self.train)
         if fitted is model.fit:
-            fitted = with_short_steps(self.plant, self.noise, model.fit, self.train)
+            fitted = refit_with_short_steps(self.plant, self.noise, model.fit, self.train)
         return self._judged(model.effects, fitted)
 
     def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:
@@ -85,7 +85,7 @@ class Search:
         only_heldout = [m for m in motions if any((m, f.name) not in model.fit.columns for f in frees)]
         known = model.fit.columns | columns(self.plant, frees, model.fit.point, only_heldout)
         cols = [self.noise.motions[m].white(np.array([known[m, f.name] for f in frees])).T for m in motions]
-        return verdict(self.noise, [left[c] for c in cycles], cycles, cols, 1.0 / N_FINAL)
+        return judge(self.noise, [left[c] for c in cycles], cycles, cols, 1.0 / N_FINAL)
 
     def left_more(self, model: Model, other: Model, noises: Sequence[Noise]) -> float:
         """How much more misfit `model` leaves of all cycles than `other`, on average over noise models."""
@@ -120,12 +120,12 @@ class Search:
 
     def without(self, model: Model, effect: Candidate, to_beat: float = np.inf) -> Model:
         """The model fitted anew without one of its effects."""
-        effects, frees, point = stripped(model, effect)
+        effects, frees, point = strip(model, effect)
         return self.model(effects, frees, point, model.fit.columns, 3, to_beat)
 
     def instead(self, model: Model, effect: Candidate, rival: Model) -> Model:
         """The model fitted anew with the last effect of `rival` in the place of one of its own."""
-        effects, frees, point = stripped(model, effect)
+        effects, frees, point = strip(model, effect)
         c = rival.effects[-1]
         start = {name: x for name, x in rival.fit.point.items() if name.startswith(f"{c.effect}.")}
         return self.model((*effects, c), (*frees, *c.frees), {**point, **start}, None, 4)

@@ -14,9 +14,9 @@ from ema.effects import registry
 
 from .candidates import Candidate, candidates, resolver_zero
 from .free import Free
-from .model import CHANCE, K_SEEN, Model, stripped
+from .model import CHANCE, K_SEEN, Model, strip
 from .noise import Noise, Verdict
-from .screening import looking_like, probed, promising, start_with
+from .screening import find_look_alikes, probe, rank_to_first_order, start_with
 from .verdicts import NEARLY
 from .weighing import ALIKE, DOUBTFUL, SAME, is_alike, is_credible, is_enough
 
@@ -32,14 +32,14 @@ def _leaves_little(model: Model, v: Verdict, before: Model) -> bool:
     return v.is_noise or model.excess <= NEARLY or (bool(model.effects) and is_enough(model, before))
 
 
-def with_fewer_faults(
+def drop_faults(
     search: Search, before: Model, model: Model, v: Verdict, alike: list[tuple[str, ...]]
 ) -> tuple[Model, Verdict]:
     """`model`, or where it leaves little, one without faults whose common part an effect of it can be just as well."""
     if not _leaves_little(model, v, before):
         return model, v
     for place, effect in enumerate(model.effects):
-        m = without_common_faults(search, model, effect)
+        m = drop_common_faults(search, model, effect)
         if m is None or search.left_more(m, model, (search.noise,)) > SAME:
             continue
         w = search.verdict(m)
@@ -56,7 +56,7 @@ def _in_common(model: Model, effect: Candidate) -> str:
     return f"{' and '.join(gone)} alike" if len(gone) > 1 else f"what {' and '.join(effect.faults)} have in common"
 
 
-def _instead(model: Model) -> str:
+def _name_stand_ins(model: Model) -> str:
     """What the last effect of a model would stand for, told beside the faults."""
     effect = model.effects[-1]
     e = registry()[effect.effect]
@@ -67,7 +67,7 @@ def _instead(model: Model) -> str:
     )
 
 
-def simpler(
+def simplify(
     search: Search, before: Model, model: Model, v: Verdict, alike: list[tuple[str, ...]], as_well: list[str]
 ) -> tuple[Model, Verdict]:
     """`model`, or where it leaves little, one with an effect for several faults that leaves no more.
@@ -79,7 +79,7 @@ def simpler(
         return model, v
     as_good = []
     here = search.noise
-    for m in instead_of_faults(search, model):
+    for m in replace_faults(search, model):
         if m.heldout > model.heldout + NEARLY:
             continue
         search.noise = Noise(search.plant, m.fit.point)
@@ -90,13 +90,13 @@ def simpler(
         if more < (SAME if fewer else -CHANCE) and (w.is_noise or not v.is_noise):
             as_good.append((more, m, w, search.noise))
         elif more < CHANCE and w.is_noise:
-            as_well.append(_instead(m))
+            as_well.append(_name_stand_ins(m))
     search.noise = here
     if not as_good:
         return model, v
     least, m, w, search.noise = min(as_good, key=lambda found: found[0])
     rivals = dict.fromkeys(n.names[-1] for more, n, *_ in as_good if more - least < ALIKE * m.excess + CHANCE)
-    for n in what_does_it_too(search, model, m, set(rivals)):
+    for n in fit_look_alikes(search, model, m, set(rivals)):
         if search.left_more(n, m, (search.noise,)) < ALIKE * m.excess + CHANCE and is_credible(n):
             rivals[n.names[-1]] = None
     alike.append((_in_common(m, m.effects[-1]), *(name for name in rivals if name != m.names[-1])))
@@ -104,7 +104,7 @@ def simpler(
     return m, w
 
 
-def with_temperature_only(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
+def drop_constant_parts(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     """`model` with effects that go with the temperature and no constant part, where that may be nothing."""
     for place, effect in enumerate(model.effects):
         constant = f"{effect.effect}.change"
@@ -123,7 +123,7 @@ def with_temperature_only(search: Search, model: Model, v: Verdict) -> tuple[Mod
     return model, v
 
 
-def with_zero(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+def take_resolver_zero(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
     """`model` with a commutation that is off with the resolver's zero, if that does at least as well.
 
     What lies within a step of the user's sensor needs no cause.
@@ -141,7 +141,7 @@ def with_zero(search: Search, model: Model, v: Verdict, alike: list[tuple[str, .
     return made, w
 
 
-def still_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...]) -> tuple[str, ...]:
+def keep_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...]) -> tuple[str, ...]:
     """The rivals of one effect that do as well beside the effects that were found after it."""
     if place == len(model.effects) - 1:
         return rivals
@@ -154,7 +154,7 @@ def still_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...
     return tuple(kept)
 
 
-def instead_of_faults(search: Search, model: Model) -> list[Model]:
+def replace_faults(search: Search, model: Model) -> list[Model]:
     """Models in which one effect stands for what several faults have in common, and as many of them vanish.
 
     A weaker magnet and three equal shorts are the same torque at the same current; the fewer causes, the likelier.
@@ -162,11 +162,11 @@ def instead_of_faults(search: Search, model: Model) -> list[Model]:
     k = model.fit.point
     found = []
     for c in candidates(search.plant.plant, search.plant.data, []):
-        common, gone = _common(model, c)
+        common, gone = _find_common(model, c)
         if c.effect in model.names or not gone or len(gone) < len(c.linear):
             continue
-        (c,) = probed(search, [c])
-        while made := _in_place_of(search, model, c, gone, common):
+        (c,) = probe(search, [c])
+        while made := _put_in_place_of_faults(search, model, c, gone, common):
             values = np.array([made.fit.point[f"{c.effect}.{name}"] for name in c.linear])
             if np.ptp(values) <= ONE_CAUSE * abs(values.mean()):
                 found.append(made)
@@ -176,35 +176,37 @@ def instead_of_faults(search: Search, model: Model) -> list[Model]:
     return sorted(found, key=lambda m: m.heldout)
 
 
-def without_common_faults(search: Search, model: Model, c: Candidate) -> Model | None:
+def drop_common_faults(search: Search, model: Model, c: Candidate) -> Model | None:
     """`model` without what the faults that one of its effects can be mistaken for have in common, if they do."""
-    common, gone = _common(model, c)
+    common, gone = _find_common(model, c)
     if not gone:
         return None
-    rest, frees = _without_common(model, c, common, gone)
+    rest, frees = _drop_common(model, c, common, gone)
     return search.model(model.effects, frees, {**model.fit.point, **rest}, model.fit.columns, 7)
 
 
-def what_does_it_too(search: Search, model: Model, best: Model, known: set[str]) -> list[Model]:
+def fit_look_alikes(search: Search, model: Model, best: Model, known: set[str]) -> list[Model]:
     """What can do nearly all that the last effect of `best` does in place of faults of `model`, fitted like it."""
-    effects, frees, rest = stripped(best, best.effects[-1])
+    effects, frees, rest = strip(best, best.effects[-1])
     gone = {f.name: 0.0 for f in model.fit.free if f.name not in {g.name for g in frees}}
     return [
         search.model((*effects, s.candidate), (*frees, *s.candidate.frees), {**rest, **s.start, **gone}, None, 5)
-        for s in looking_like(search, model, best, promising(search, model), known)
+        for s in find_look_alikes(search, model, best, rank_to_first_order(search, model), known)
     ]
 
 
-def _in_place_of(search: Search, model: Model, c: Candidate, gone: Sequence[str], common: float) -> Model | None:
+def _put_in_place_of_faults(
+    search: Search, model: Model, c: Candidate, gone: Sequence[str], common: float
+) -> Model | None:
     """`model` with an effect for what several faults have in common, and without those of them that are gone."""
-    rest, frees = _without_common(model, c, common, gone)
+    rest, frees = _drop_common(model, c, common, gone)
     made = search.model((*model.effects, c), (*frees, *c.frees), start_with(search, model, c, rest), None, 3)
     if made.heldout > HOPELESS:
         return None
     return search.model(made.effects, made.fit.free, made.fit.point, made.fit.columns, 7)
 
 
-def _common(model: Model, c: Candidate) -> tuple[float, list[str]]:
+def _find_common(model: Model, c: Candidate) -> tuple[float, list[str]]:
     """What the several faults that an effect can be mistaken for have in common, and which of them are no larger."""
     faults = {name: model.fit.point.get(name, 0.0) for name in c.faults}
     common = min(faults.values(), default=0.0)
@@ -213,7 +215,7 @@ def _common(model: Model, c: Candidate) -> tuple[float, list[str]]:
     return common, [name for name, x in faults.items() if x - common < K_SEEN]
 
 
-def _without_common(model: Model, c: Candidate, common: float, gone: Sequence[str]) -> tuple[Point, tuple[Free, ...]]:
+def _drop_common(model: Model, c: Candidate, common: float, gone: Sequence[str]) -> tuple[Point, tuple[Free, ...]]:
     """Faults of an effect less what they have in common, zero where they are gone, and what else stays free."""
     rest = {name: 0.0 if name in gone else model.fit.point[name] - common for name in c.faults}
     return rest, tuple(f for f in model.fit.free if f.name not in gone)

@@ -16,7 +16,7 @@ DOUBT = 3.0  # deviations between repetitions that count as none: what drifts is
 LIKE = 0.01  # of what the voltage swings by: what honest simulations of one source may differ by
 
 
-def resolved(data: Measured, at: Sequence[slice]) -> float | None:
+def resolve(data: Measured, at: Sequence[slice]) -> float | None:
     """Standard deviation with which averages of the bus voltage are to be trusted, None if no repetition tells. [V]
 
     Parameters

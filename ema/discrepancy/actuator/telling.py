@@ -15,8 +15,8 @@ from ema.discrepancy.plant import Point
 from ema.effects import registry
 
 from . import controller, repeating
-from .entrants import as_told
-from .extension import as_extension
+from .entrants import describe_posterior
+from .extension import write_extension
 from .fit import SEED, Fit
 from .intervals import FORM, deviation, of_faults
 from .leave_out import over_folds, square
@@ -41,7 +41,7 @@ OF_NATS = {"evidence": "the evidence of the record", "held-out cycles": "what he
 NON_INTEGER = 0.06  # distance of an order from the next integer from which it is none
 
 
-def told(
+def write_findings(
     search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]], outcome: Outcome
 ) -> Findings:
     """The verdict on `after`, with its effects and their rivals `alike`, structure, gain over `before`, notes.
@@ -63,18 +63,18 @@ def told(
         base = Model((), before.fit, before.heldout) if odd or too_little else after  # beside what is named
         shape = structure(search.torques(base), search.plant.plant.control.rate, v.scores)
         signals = search.plant.data.signals
-        shape["sentences"] += controller.said(search.plant.plant, signals)
+        shape["sentences"] += controller.describe_gains(search.plant.plant, signals)
         rests = [(signals[c], r) for c, r, _ in search.rests(base, "control")]
-        if of_error := controller.of_error(search.plant.plant, rests):
+        if of_error := controller.fit_function_of_error(search.plant.plant, rests):
             shape["controller"] = of_error
-            shape["sentences"] += controller.said_of_error(of_error)
-        shape["sentences"] += repeating.said(repeating.repeating(search, base.fit.point))
+            shape["sentences"] += controller.describe_function_of_error(of_error)
+        shape["sentences"] += repeating.describe(repeating.repeating(search, base.fit.point))
     if made.is_little and not made.left.is_chance:
         notes.append(f"{made.left.sentence} (p = {v.p_value:.1g})")
     if not search.plant.data.has_temperature:
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
     rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
-    found = [_found(search, after, c.effect, a, rest, outcome) for c, a in kept]
+    found = [_describe_effect(search, after, c.effect, a, rest, outcome) for c, a in kept]
     if is_beside:
         found = [replace(e, confidence=UNCERTAIN_LAW * e.confidence) for e in found]
         notes += _recorded_once(search, after)
@@ -93,19 +93,20 @@ def told(
         for m in sorted(search.tried, key=lambda m: m.heldout)
     ]
     lines = [c for c in (*odd, *further) if c in made.model.effects]
-    unnamed = [_found(search, after, c.effect, (), rest, outcome, "torque_line") for c in lines][:1]
+    unnamed = [_describe_effect(search, after, c.effect, (), rest, outcome, "torque_line") for c in lines][:1]
     if further and unnamed:
         values = {name: q.value for name, q in unnamed[0].parameters.items()}
         unnamed = [replace(unnamed[0], sentence=f"a further {registry()['cogging'].said(values)}")]
         notes.append(f"beside it stands {unnamed[0].sentence}")
     return Findings(
         made.verdict, found, _gain(search, before, made.model, v, made, outcome), shape, tried, notes,
-        unnamed=unnamed, posterior=as_told(outcome), rejected=rejected(search, before, after, outcome), seeds=SEEDS,
+        unnamed=unnamed, posterior=describe_posterior(outcome),
+        rejected=describe_rejected(search, before, after, outcome), seeds=SEEDS,
         rest=0.0 if made.left.is_chance else made.left.residual.rest,
     )  # fmt: skip
 
 
-def rejected(search: Search, before: Model, after: Model, outcome: Outcome) -> list[dict[str, Any]]:
+def describe_rejected(search: Search, before: Model, after: Model, outcome: Outcome) -> list[dict[str, Any]]:
     """Sets of causes that were fitted and are not the answer: how much less likely, and what they leave.
 
     By the evidence of the record where a set was weighed so, else by held-out cycles, where both were judged by one
@@ -163,12 +164,12 @@ def _left_in_training(before: Model, after: Model) -> float:
     return max(after.fit.misfit - 1.0, 0.0) / max(before.fit.misfit - 1.0, 1e-9)
 
 
-def with_function(search: Search, findings: Findings, before: Model, after: Model) -> tuple[Findings, Model]:
+def try_as_function(search: Search, findings: Findings, before: Model, after: Model) -> tuple[Findings, Model]:
     """What the structure says as a function, simulated: part of the extended plant if held-out cycles gain by it."""
     if "controller" in findings.structure:
         return findings, after  # a torque would stand in for it
     base = Model((), before.fit, before.heldout)
-    for effect, values in as_extension(findings.structure).items():
+    for effect, values in write_extension(findings.structure).items():
         table = {f"{effect}.{name}": value for name, value in values.items()}
         m = search.model((), base.fit.free, {**base.fit.point, **table}, None, 4)
         if base.excess - m.excess < WORTH_IT * base.excess:
@@ -200,7 +201,7 @@ def _integer(fit: Fit, line: str) -> bool:
     return abs(order - round(order)) < max(NON_INTEGER, 3.0 * sd)
 
 
-def _found(
+def _describe_effect(
     search: Search, model: Model, effect: str, alike: tuple[str, ...], rest: float, outcome: Outcome, told_as: str = ""
 ) -> FoundEffect:
     """What was fitted as `effect`, told as that or as another effect with the same parameters.

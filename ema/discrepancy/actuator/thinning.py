@@ -17,12 +17,12 @@ BY_CYCLE = ("motion", "start", "speed", "user_speed", "holding", "dT", "faults")
 AT_LEAST = 2  # of each motion: one to fit, one to judge
 
 
-def spread(cycles: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+def choose_evenly(cycles: NDArray[np.int64], n: int) -> NDArray[np.int64]:
     """At most `n` of the cycles, from first to last."""
     return cycles[np.unique(np.linspace(0, len(cycles) - 1, n).round().astype(int))]
 
 
-def thinned(data: Measured, most: int = MOST) -> tuple[Measured, str | None]:
+def thin(data: Measured, most: int = MOST) -> tuple[Measured, str | None]:
     """At most `most` of the cycles, alike of every motion, and what is said of it; all where there are no more."""
     if data.n_cycles <= most:
         return data, None
@@ -30,7 +30,7 @@ def thinned(data: Measured, most: int = MOST) -> tuple[Measured, str | None]:
     each = next(
         (n for n in range(most, AT_LEAST, -1) if sum(min(n, len(cycles)) for cycles in of_motion) <= most), AT_LEAST
     )
-    kept = np.sort(np.concatenate([spread(cycles, each) for cycles in of_motion]))
+    kept = np.sort(np.concatenate([choose_evenly(cycles, each) for cycles in of_motion]))
     if len(kept) == data.n_cycles:
         return data, None
     told = f"{len(kept)} of {data.n_cycles} cycles were examined, spread over the records; --cycles chooses others"

@@ -21,7 +21,7 @@ TRIED = (-2, -1, 1, 2)  # samples
 CLEAR = 0.1  # share of what is left that a shift may leave; a sensor's delay, which looks alike, leaves more
 
 
-def samples_late(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]) -> int:
+def find_samples_late(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]) -> int:
     """Samples by which the command is late, 0 unless that takes nearly all that `point` leaves."""
     here = plant.late
 

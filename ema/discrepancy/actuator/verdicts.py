@@ -10,7 +10,7 @@ import numpy as np
 from .comparators import CLEAR, PLAIN, find_step, take_step
 from .model import CHANCE, DISTANT, Model
 from .noise import N_RUNS_SURE, Noise, Verdict
-from .timing import samples_late
+from .timing import find_samples_late
 
 if TYPE_CHECKING:
     from .search import Search
@@ -20,18 +20,18 @@ PHASES = ("_a", "_b", "_c")
 NEARLY = 0.5  # excess of a model that may be the right one but for switching
 
 
-def surely(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
+def judge_closely(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     """The verdict, in a close case by a null distribution from more runs and by another step of the comparators."""
     if v.is_noise or model.excess > NEARLY:
         return model, v
     search.noise = Noise(search.plant, model.fit.point, N_RUNS_SURE)
     v = search.verdict(model)
-    return (model, v) if v.is_noise else as_on_the_bench(search, model, v, PLAIN)
+    return (model, v) if v.is_noise else take_bench_conditions(search, model, v, PLAIN)
 
 
-def as_on_the_bench(search: Search, model: Model, v: Verdict, share: float = CLEAR) -> tuple[Model, Verdict]:
+def take_bench_conditions(search: Search, model: Model, v: Verdict, share: float = CLEAR) -> tuple[Model, Verdict]:
     """`model` with the command and the grid of the comparators that the record seems to have, if others than ours."""
-    late = samples_late(search.plant, search.noise, model.fit.point, search.train)
+    late = find_samples_late(search.plant, search.noise, model.fit.point, search.train)
     if late:
         search.plant.late = late
         model = search.model(model.effects, model.fit.free, model.fit.point, None, 3)
@@ -50,11 +50,11 @@ def as_on_the_bench(search: Search, model: Model, v: Verdict, share: float = CLE
     return model, v
 
 
-def at_the_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
+def settle_at_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     """`model` with faults and effects told apart that look nearly the same, as far as the record allows."""
     if not model.effects or model.excess > DISTANT or search.is_settled(model):
         return model, v
-    model, v = _at_the_minimum(search, *begun_again(search, model, v))
+    model, v = _at_the_minimum(search, *begin_again(search, model, v))
     search.minima.append((model.fit, search.noise))
     return model, v
 
@@ -67,7 +67,7 @@ def _at_the_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, Ve
     return replace(model, fit=replace(model.fit, sd=sd)), v
 
 
-def begun_again(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
+def begin_again(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     """`model`, or where that leaves less, fitted anew from sensors whose gains (or offsets) have nothing in common.
 
     Sensors that all read too high, and a lighter rotor with less drag and friction, balance the torque alike. A ridge

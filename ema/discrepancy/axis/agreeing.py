@@ -19,14 +19,14 @@ from ema.discrepancy.plant import Point
 from .balance.as_effects import effects
 from .balance.found import Balance, Term
 from .beside import balance_beside
-from .named_laws import missing, named, of_balance
-from .witness import support
+from .named_laws import find_missing, name_law, name_laws
+from .witness import measure_support
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
 
 
-def together(
+def merge(
     plant: AxisPlant, found: Sequence[shared.FoundEffect], verdict: str, point: Point, *, follows: bool = False
 ) -> tuple[list[shared.FoundEffect], Balance | None]:
     """Effects as free runs found them at `point`, with what the balance says of them, and a balance that adds some.
@@ -37,26 +37,26 @@ def together(
     out = list(found)
     for term in b.terms if b is not None else ():
         assert b is not None
-        name = named(b, term)
+        name = name_law(b, term)
         own = [k for k, e in enumerate(out) if e.name == name and _is_same(e, effects(b, term)[name])]
         for k in own:
             if out[k].indistinguishable_from:
                 continue
             out[k] = replace(out[k], confidence=max(out[k].confidence, round(b.confidence(term), 4)))
-    if b is None or verdict in ("adequate", "explained") or not missing(b, out):
+    if b is None or verdict in ("adequate", "explained") or not find_missing(b, out):
         return out, None
     if found:
         b = balance_beside(plant, point)
-    added = missing(b, out) if b is not None else []
+    added = find_missing(b, out) if b is not None else []
     if b is not None and follows:
-        added = [_as_needed(t, support(plant, point, b, t)) for t in added]
+        added = [_limit(t, measure_support(plant, point, b, t)) for t in added]
         added = [t for t in added if b.of_set(t) >= NAMED]
     if b is None or not added:
         return out, None
-    return [*out, *of_balance(plant, b, added)], b
+    return [*out, *name_laws(plant, b, added)], b
 
 
-def _as_needed(term: Term, share: float) -> Term:
+def _limit(term: Term, share: float) -> Term:
     """A law and what does as well, each as sure as `share` allows."""
     return replace(term, wins=share * term.wins, alike={name: share * wins for name, wins in term.alike.items()})
 

@@ -18,7 +18,7 @@ from ema.discrepancy.examine import examine
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Point
 from ema.discrepancy.progress import Progress
-from ema.discrepancy.selection import ODDS, Tried, above_noise, base_model, compare, refitted
+from ema.discrepancy.selection import ODDS, Tried, above_noise, compare, fit_base, refit
 from ema.discrepancy.verdict import judge
 
 from .plant import AxisPlant
@@ -36,7 +36,7 @@ SAID = {
 }
 
 
-def examined(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
+def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     """`examine`, with the drive between samples as the record shows it; told where it does not run straight."""
     progress = progress or Progress()
     if all(w.static for w in plant.windows):
@@ -48,7 +48,7 @@ def examined(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     here = plant.between
     there = _beside(plant, outcome)
     if there == here:
-        there = _doubted(plant, outcome)
+        there = _find_doubt(plant, outcome)
     if there != here:
         progress(f"again, with a drive that is {there} between samples")
         plant.between = there
@@ -90,7 +90,7 @@ class Rereading:
         for way in [way for way in LATE if way != here]:
             plant.between = way
             self._progress(f"a drive that is {way} between samples")
-            tried[way] = refitted(plant, model)
+            tried[way] = refit(plant, model)
         plant.between = here
         best = max(tried, key=lambda way: compare(tried[way], model).gain)
         if compare(tried[best], model).gain < ODDS or compare(tried[best], further).gain < 0.0:
@@ -100,7 +100,7 @@ class Rereading:
         return True
 
 
-def _doubted(plant: AxisPlant, outcome: Outcome) -> str:
+def _find_doubt(plant: AxisPlant, outcome: Outcome) -> str:
     """Another way that what was found, or not, may come from."""
     if plant.plant.drive == "speed-loop" and outcome.effects:
         return "fast" if plant.between == "straight" else "straight"
@@ -146,7 +146,7 @@ def _ways(plant: AxisPlant) -> tuple[str, ...]:
 
 def _plain(plant: AxisPlant, way: str) -> Tried:
     plant.between = way
-    return base_model(plant)
+    return fit_base(plant)
 
 
 def _beside(plant: AxisPlant, outcome: Outcome) -> str:
@@ -159,7 +159,7 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
 
     def left(way: str) -> float:
         plant.between = way
-        point = _less_late(outcome.point, (LATE[way] - LATE[here]) * period)
+        point = _shorten_delays(outcome.point, (LATE[way] - LATE[here]) * period)
         residuals = [r.ravel() for r in plant.residuals([point], blocks)[0]]
         return max(float(np.mean(np.clip(np.concatenate(residuals), -8.0, 8.0) ** 2)) - 1.0, 0.0)
 
@@ -174,7 +174,7 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     return "held" if here == "straight" and by_half else here
 
 
-def _less_late(point: Point, by: float) -> Point:
+def _shorten_delays(point: Point, by: float) -> Point:
     """The point with what delays it has shorter, as far as they go."""
     return {**point, **{name: max(point[name] - by, 0.0) for name in DELAYS if name in point}}
 

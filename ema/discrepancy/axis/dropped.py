@@ -30,7 +30,7 @@ MOST = 3  # effects
 WIDER = (10.0, 100.0)  # times the bound
 
 
-def dropped(plant: AxisPlant, outcome: Outcome, named: set[str]) -> list[dict[str, Any]]:
+def list_dropped(plant: AxisPlant, outcome: Outcome, named: set[str]) -> list[dict[str, Any]]:
     """What explains a share of the rest and is not in the answer: name, before, after, why."""
     if outcome.verdict == "adequate":
         return []

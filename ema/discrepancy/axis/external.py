@@ -29,7 +29,7 @@ SAME_SIZE = 0.1  # of an amplitude, that a record may differ by where its zero a
 DEVIATIONS = 1.96  # of an interval of 95 %
 
 
-def with_external(plant: AxisPlant, found: Sequence[shared.FoundEffect]) -> list[shared.FoundEffect]:
+def add_external(plant: AxisPlant, found: Sequence[shared.FoundEffect]) -> list[shared.FoundEffect]:
     """Causes with the external torque beside cogging, or named with the records where lines of torque differ."""
     apart = _apart(plant)
     orders = {a.order for a in apart}
@@ -37,7 +37,7 @@ def with_external(plant: AxisPlant, found: Sequence[shared.FoundEffect]) -> list
     return [*(_beside(plant, e) for e in kept), *(_named(a) for a in apart)]
 
 
-def own_orders(plant: AxisPlant) -> int | None:
+def find_own_order(plant: AxisPlant) -> int | None:
     """The order of which a sound motor's cogging has multiples; None where slots and poles are not declared."""
     p, slots = getattr(plant.plant, "p", None), getattr(plant.plant, "slots", None)
     return math.lcm(slots, 2 * p) if p and slots else None
@@ -47,7 +47,7 @@ def _beside(plant: AxisPlant, e: shared.FoundEffect) -> shared.FoundEffect:
     """Cogging at an order that need not be the motor's own."""
     if e.name != "cogging" or e.indistinguishable_from or not _torque_of(plant):
         return e
-    own, order = own_orders(plant), e.parameters["order"].value
+    own, order = find_own_order(plant), e.parameters["order"].value
     if own is not None and order % own == 0.0:
         return e
     share = NEIGHBOUR if own is None else 0.5

@@ -26,7 +26,7 @@ SHORTEST = 40  # samples of a part with the drive on
 SMOOTH = 3  # samples to each side, over which the speed is taken
 
 
-def intake(plant: Axis, records: Sequence[Record]) -> list[Record]:
+def take_in(plant: Axis, records: Sequence[Record]) -> list[Record]:
     """The records with the channel that drives."""
     return [_driven(plant, record) for record in records]
 
@@ -38,7 +38,7 @@ def _driven(plant: Axis, record: Record) -> Record:
         channels = dict(cycle.channels)
         loop, wanted = plant.position_loop, drive
         if loop is not None and GIVEN[loop.gives] not in channels and drive not in channels:
-            channels[GIVEN[loop.gives]] = asked(plant, loop, cycle, record.name)
+            channels[GIVEN[loop.gives]] = ask_of_loop(plant, loop, cycle, record.name)
         if wanted == "u_q" and "u_q" not in channels and "duty" in channels:
             channels["u_q"] = channels["duty"] * _supply(plant, channels, record.name)
         if plant.drive == "torque" and "torque" in channels and plant.torque_at != plant.measured_at:
@@ -51,7 +51,7 @@ def _driven(plant: Axis, record: Record) -> Record:
     return replace(record, cycles=tuple(cycles))
 
 
-def asked(plant: Axis, loop: PositionLoop, cycle: Cycle, name: str) -> Array:
+def ask_of_loop(plant: Axis, loop: PositionLoop, cycle: Cycle, name: str) -> Array:
     """What a position loop asks for along the measured motion, in its own unit."""
     position, reference = ("q", "q_ref") if isinstance(plant, LinearAxis) else ("theta_m", "theta_ref")
     missing = [channel for channel in (position, reference) if channel not in cycle]

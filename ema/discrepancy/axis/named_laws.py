@@ -15,7 +15,7 @@ from ema.models.axis_config import LinearAxis
 
 from .balance.as_effects import effects
 from .balance.found import Balance, Term
-from .balance.telling import drawn
+from .balance.telling import draw
 from .balance.telling_records import INTERVAL
 from .linear import of_axis
 
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
 ALONE = " (shown by the balance along the measured motion, not by free runs)"
 
 
-def missing(b: Balance, found: Sequence[shared.FoundEffect]) -> list[Term]:
+def find_missing(b: Balance, found: Sequence[shared.FoundEffect]) -> list[Term]:
     """Likely laws that the library has as effects, and that nothing found stands for."""
     told = {name for e in found for name in (e.name, *e.indistinguishable_from)}
-    new = [term for term in b.terms if (name := named(b, term)) and not {name, *term.law.also} & told]
+    new = [term for term in b.terms if (name := name_law(b, term)) and not {name, *term.law.also} & told]
     return [term for term in new if b.of_set(term) >= NAMED]
 
 
-def of_balance(plant: AxisPlant, b: Balance, terms: Sequence[Term]) -> list[shared.FoundEffect]:
+def name_laws(plant: AxisPlant, b: Balance, terms: Sequence[Term]) -> list[shared.FoundEffect]:
     """Laws of the balance as effects that were found."""
-    return [_effect(plant, b, term, named(b, term)) for term in terms]
+    return [_effect(plant, b, term, name_law(b, term)) for term in terms]
 
 
-def named(b: Balance, term: Term) -> str:
+def name_law(b: Balance, term: Term) -> str:
     """The effect that acts like a law; empty where the library has none."""
     return next((name for name, values in effects(b, term).items() if values), "")
 
@@ -46,7 +46,7 @@ def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.Found
     effect, linear = registry()[name], isinstance(plant.plant, LinearAxis)
     said = partial(of_axis, linear=linear)
     values = effects(b, term)[name]
-    samples = [effects(b, term, c)[name] for c in drawn(b)]
+    samples = [effects(b, term, c)[name] for c in draw(b)]
     units = {p.name: said(p.unit) for p in effect.parameters}
     parameters = {}
     for key, value in values.items():

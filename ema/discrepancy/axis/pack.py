@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ema.core.records import Array
 
-from .whitening import Filter, joined
+from .whitening import Filter, join
 from .windows import Bench, Window
 
 MEMORY = 1.0  # [s] for which a load behind a gear is followed before a window
@@ -30,7 +30,7 @@ class Pack:
         self.slide = np.array([way[0] if len(way) == 1 else 0.0 for way in ways])
         directions = [w.direction for w in windows if w.direction is not None]
         self.direction = np.concatenate(directions) if directions else None
-        self.filter = joined(filters) if filters else None
+        self.filter = join(filters) if filters else None
 
     def drive_by(self, clock: float) -> Array:
         """The drive at the samples of the motion, where it has a clock of its own."""

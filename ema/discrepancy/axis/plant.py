@@ -20,15 +20,15 @@ from . import candidates, describe, structure
 from .balance.course import courses
 from .balance.found import Balance
 from .balance.of_records import balance, plain_of
-from .balance.own_zeros import refined
-from .intake import intake
+from .balance.own_zeros import refine_zeros
+from .intake import take_in
 from .measured import Zero
 from .naming import Numbers, numbers_of
 from .noise import ESTIMATE_UNCERTAINTY
 from .noise_model import position_noise, whitener, without_start
 from .pack import Pack
-from .predictable import LONGEST_WINDOW, predictable
-from .screened import screened
+from .predictable import LONGEST_WINDOW, predictable_time
+from .screened import suggest_by_balance
 from .undersampled import refuse_undersampled
 from .windows import Bench, Window, bench
 from .zeros import zeros
@@ -56,7 +56,7 @@ class AxisPlant:
 
     def __init__(self, plant: Axis, records: Sequence[Record], n_threads: int | None = None):
         self.plant = plant
-        records = intake(plant, records)
+        records = take_in(plant, records)
         for record in records:
             refuse_undersampled(plant, record)
         self.records = tuple(records)
@@ -66,10 +66,10 @@ class AxisPlant:
         length = plant.window or LONGEST_WINDOW
         self._take([bench(plant, record, name, length) for record, name in zip(records, names, strict=True)])
         if plant.window is None:
-            lengths = [predictable(self, b) for b in self.benches]
+            lengths = [predictable_time(self, b) for b in self.benches]
             self._take([bench(plant, *parts) for parts in zip(records, names, lengths, strict=True)])
         self.zeros: dict[str, Zero] = zeros(self)
-        self.zeros = refined(self, courses(self), plain_of(plant))
+        self.zeros = refine_zeros(self, courses(self), plain_of(plant))
         self._balances: dict[str, Balance | None] = {}
 
     @property
@@ -111,7 +111,7 @@ class AxisPlant:
 
     def candidates(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Library effects with bounds and starts for this axis."""
-        return [*candidates.library(self, point, blocks), *screened(self.balance, self.plant, point)]
+        return [*candidates.library(self, point, blocks), *suggest_by_balance(self.balance, self.plant, point)]
 
     def structure(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Terms that the torque residual along the measured motion suggests."""

@@ -52,7 +52,7 @@ class Electrical:
     k_e_error: float
 
 
-def implausible(plant: AxisPlant, outcome: Outcome) -> list[str]:
+def find_implausible(plant: AxisPlant, outcome: Outcome) -> list[str]:
     """One sentence for each value that cannot be."""
     p = plant.plant
     out = [*_of_power(plant), *_fitted(plant, outcome)]
@@ -135,7 +135,7 @@ def _rows(plant: AxisPlant, c: Cycle) -> tuple[Array, Array] | None:
     return np.stack([i, local_polynomial(t, i, N_HALF, 2)[1], w], axis=1), c["u_q"]
 
 
-def told(plant: AxisPlant) -> dict[str, Any]:
+def describe(plant: AxisPlant) -> dict[str, Any]:
     """The same for findings.json; empty where the records do not show it."""
     seen = electrical(plant)
     if seen is None:

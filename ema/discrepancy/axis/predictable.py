@@ -11,7 +11,7 @@ from ema.models.axis_config import LinearAxis
 
 from .cogging import ALARM, integer_orders, scan
 from .fading import SPEEDS, fadings
-from .weak_form import FEWEST, Weak, thinned, weak_form
+from .weak_form import FEWEST, Weak, thin, weak_form
 from .windows import Bench
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ N_GROWTHS = 3.0  # growth of e^3 in a window
 LONGEST_WINDOW = 0.4  # [s]
 
 
-def predictable(plant: Measured, bench: Bench) -> float:
+def predictable_time(plant: Measured, bench: Bench) -> float:
     """Length of time over which the motion of a record can be foretold from a start state. [s]
 
     Deviations grow like exp(λ t); after a few of these the start state's noise decides.
@@ -29,7 +29,7 @@ def predictable(plant: Measured, bench: Bench) -> float:
     moving = [j for j, w in enumerate(plant.windows) if w.group == bench.name and not w.static]
     if not moving:
         return LONGEST_WINDOW
-    weak = thinned(weak_form(plant, {}, moving))
+    weak = thin(weak_form(plant, {}, moving))
     if len(weak.y) < FEWEST:
         return LONGEST_WINDOW
     growth = max(_of_lines(plant, weak), _of_falling_friction(plant, weak))

@@ -38,7 +38,7 @@ class Ripple:
     speed: float
 
 
-def ripples(cycle: Cycle) -> list[Ripple]:
+def find_ripples(cycle: Cycle) -> list[Ripple]:
     """Lines of a cycle's steady speed that both its halves show, the strongest first."""
     theta, w = np.unwrap(cycle["theta_m"]), cycle["w_m"]
     median = float(np.median(w))
@@ -72,7 +72,7 @@ def _lines(theta: Array, w: Array, highest: int) -> Array:
     return np.asarray(x[: 2 * highest : 2] - 1j * x[1 : 2 * highest : 2])
 
 
-def said(plant: AxisPlant) -> Iterator[str]:
+def describe(plant: AxisPlant) -> Iterator[str]:
     """A sentence for each record under a constant voltage whose speed ripples."""
     if isinstance(plant.plant, LinearAxis):
         return
@@ -81,7 +81,7 @@ def said(plant: AxisPlant) -> Iterator[str]:
             one
             for cycle in record
             if bench.roles.kind == "voltage" and {"theta_m", "w_m"} <= set(cycle.channels) and _is_one_voltage(cycle)
-            for one in ripples(cycle)
+            for one in find_ripples(cycle)
         ]
         if found:
             lines = "; ".join(_line(plant, one) for one in found[:MOST])

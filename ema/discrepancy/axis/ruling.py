@@ -23,9 +23,9 @@ from ema.models.axis_config import LinearAxis
 from .balance.as_effects import effects, point
 from .balance.found import Balance
 from .balance.needed import ALARM, chance
-from .balance.regression import fitted
-from .balance.telling import drawn, of_law
-from .named_laws import missing, of_balance
+from .balance.regression import regress
+from .balance.telling import draw, of_law
+from .named_laws import find_missing, name_laws
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -50,18 +50,18 @@ class Ruling:
         return f"the verdict and the gain are of the balance of torque, not of free runs: {self.why}"
 
 
-def ruling(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
+def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
     """The balance's own verdict; None where free runs can say, or where there is no balance."""
     b = plant.balance
     if b is None:
         return None
     if b.given:
         own = [_neighbour(b)] if _is_seen(b) else []
-        return Ruling([*own, *of_balance(plant, b, missing(b, []))], _left(plant, b), NEIGHBOUR)
+        return Ruling([*own, *name_laws(plant, b, find_missing(b, []))], _measure_left(plant, b), NEIGHBOUR)
     is_blind = outcome.verdict == "adequate" and outcome.heldout.noise_floor > WITNESS
-    named = missing(b, []) if is_blind else []
+    named = find_missing(b, []) if is_blind else []
     if named and not _is_refuted(plant, outcome, b):
-        return Ruling(of_balance(plant, b, named), _left(plant, b), BLIND.format(outcome.heldout.noise_floor))
+        return Ruling(name_laws(plant, b, named), _measure_left(plant, b), BLIND.format(outcome.heldout.noise_floor))
     return None
 
 
@@ -85,7 +85,7 @@ def gain(b: Balance, left: Left, outcome: Outcome, linear: bool) -> dict[str, An
     }
 
 
-def _left(plant: AxisPlant, b: Balance) -> Left:
+def _measure_left(plant: AxisPlant, b: Balance) -> Left:
     """What the balance leaves of held-out blocks, over the drive's torque."""
     rows = b.model.rows
     before = (rows.y - b.plain.inertia * rows.alpha) ** 2
@@ -102,15 +102,15 @@ def _left(plant: AxisPlant, b: Balance) -> Left:
 
 def _is_seen(b: Balance) -> bool:
     """Whether the declared neighbour does anything."""
-    without = fitted(b.model.rows, b.plain, [law for law in b.model.laws if law not in b.given])
+    without = regress(b.model.rows, b.plain, [law for law in b.model.laws if law not in b.given])
     return chance(b.model, without, b.given) < ALARM
 
 
 def _neighbour(b: Balance) -> shared.FoundEffect:
     """The declared neighbour as a cause: its mark over that and the rest is how sure it is."""
     (law,) = b.given
-    told = of_law(b, law, drawn(b))
-    without = fitted(b.model.rows, b.plain, [own for own in b.model.laws if own is not law])
+    told = of_law(b, law, draw(b))
+    without = regress(b.model.rows, b.plain, [own for own in b.model.laws if own is not law])
     mark = (without.loss - b.model.loss) / max(int(b.model.rows.whole.sum()), 1)
     sure = max(mark, 0.0) / max(mark + b.left - b.noise, 1e-300)
     parameters = {name: shared.Quantity(**q) for name, q in told["parameters"].items()}

@@ -13,7 +13,7 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 from ema.models.axis_config import LINES, Axis
 
-from .balance.as_effects import effects, instead, line_point
+from .balance.as_effects import effects, find_alternatives, line_point
 from .balance.found import Balance
 
 SCREENED = (
@@ -25,23 +25,23 @@ ROOM = 10.0  # times the size that the regression found, to which a fit may go
 FIXED = ("turns", "centre", "since", "coefficient", "damping")  # parameters that the records of one bench hardly show
 
 
-def screened(balance: Balance | None, plant: Axis, point: Point) -> list[Candidate]:
+def suggest_by_balance(balance: Balance | None, plant: Axis, point: Point) -> list[Candidate]:
     """Candidates for the laws that the balance needs."""
     if balance is None:
         return []
     have = {name.split(".")[0] for name in point} | set(plant.effects)
     out = []
     for term in balance.terms:
-        for name, values in (instead(balance, term) | effects(balance, term)).items():
+        for name, values in (find_alternatives(balance, term) | effects(balance, term)).items():
             if name not in SCREENED:
                 continue
-            law = begun(name, values)
+            law = begin_at(name, values)
             if not ({f.name for f in law.free} & point.keys() if name in LINES else name in have):
                 out.append(law)
     return out
 
 
-def begun(name: str, values: dict[str, float]) -> Candidate:
+def begin_at(name: str, values: dict[str, float]) -> Candidate:
     """An effect that is fitted from where the balance has it."""
     return (_line if name in LINES else _candidate)(name, values)
 

@@ -28,7 +28,7 @@ class Stamps:
     samples: str  # "as stamped", "even" or "either"
 
 
-def stamps(cycle: Cycle, channel: str) -> Stamps:
+def examine_stamps(cycle: Cycle, channel: str) -> Stamps:
     """What a smooth `channel` (an angle, or a speed) says of the time stamps."""
     t, x = cycle["t"], cycle[channel]
     step = np.diff(t)
@@ -52,9 +52,9 @@ def _roughness(t: Array, x: Array) -> Array:
     return np.array([part.mean() for part in np.array_split(left, BLOCKS)]) + np.finfo(float).tiny
 
 
-def said(name: str, cycles: tuple[Cycle, ...], channel: str) -> list[str]:
+def describe(name: str, cycles: tuple[Cycle, ...], channel: str) -> list[str]:
     """One sentence for a record whose stamps vary; empty where they are even."""
-    found = [stamps(c, channel) for c in cycles]
+    found = [examine_stamps(c, channel) for c in cycles]
     clear = [s for s in found if s.samples != "either"]
     if not clear:
         return []

@@ -18,7 +18,7 @@ from ema.effects.search import AxisSizes
 from ema.effects.torque_term import COLUMNS, EVEN, NEUTRAL, power
 
 from .sizes import sizes
-from .weak_form import FEWEST, Motion, Weak, thinned, weak_form
+from .weak_form import FEWEST, Motion, Weak, thin, weak_form
 
 if TYPE_CHECKING:
     from .measured import Measured
@@ -45,12 +45,12 @@ class Term:
 
 def search(plant: Measured, point: Point, blocks: Sequence[int]) -> list[Candidate]:
     """The best member of each family, the one that explains most first."""
-    weak = thinned(weak_form(plant, point, blocks))
+    weak = thin(weak_form(plant, point, blocks))
     if len(weak.y) < FEWEST:
         return []
     m = weak.motion
     q, rest = weak.beside()
-    needed = _needed(plant, weak)
+    needed = _needed_drive(plant, weak)
     best: dict[str, tuple[float, Term, Array]] = {}
     for family, terms in _families(m, sizes(plant), _own_frequency(plant)).items():
         for gain, term, coefficients in _gains(weak, terms, needed, q, rest):
@@ -69,7 +69,7 @@ def _families(m: Motion, s: AxisSizes, own: float) -> dict[str, list[Term]]:
     return out
 
 
-def _needed(plant: Measured, weak: Weak) -> Array:
+def _needed_drive(plant: Measured, weak: Weak) -> Array:
     """Current (or force) that the model needs over each test function, (n_y,).
 
     What is recorded holds the torque that is looked for: the residual would be a function of itself.

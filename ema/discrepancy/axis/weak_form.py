@@ -128,7 +128,7 @@ def weak_form(plant: Measured, point: Point, blocks: Sequence[int]) -> Weak:
     return Weak(y, sigma, inertia, motion, index, weight, block.astype(int))
 
 
-def thinned(weak: Weak) -> Weak:
+def thin(weak: Weak) -> Weak:
     """At most `MAX_ROWS` test functions, evenly."""
     if len(weak.y) <= MAX_ROWS:
         return weak

@@ -69,7 +69,7 @@ def design(H: Array, noise: Array, process: Array, t: Array, start_rms: tuple[fl
     return Filter(gain, rms, H, dt, damping, begin)
 
 
-def joined(filters: Sequence[Filter]) -> Filter:
+def join(filters: Sequence[Filter]) -> Filter:
     """One filter for windows that lie one after the other."""
     stacked = [np.concatenate([getattr(f, name) for f in filters]) for name in ("gain", "rms", "dt", "begin")]
     gain, rms, dt, begin = stacked
@@ -77,7 +77,7 @@ def joined(filters: Sequence[Filter]) -> Filter:
 
 
 @njit(inline="always")
-def _propagated(p00, p01, p11, process, h, damping):
+def _propagate(p00, p01, p11, process, h, damping):
     """Covariance of position and speed one step `h` later, under an acceleration noise of rms `process`."""
     a = np.exp(-damping * h)
     b = (1.0 - a) / damping if damping > 0.0 else h
@@ -100,7 +100,7 @@ def _design(H, noise, process, dt, P, damping, gain, rms):
             gain[k, c, 0], gain[k, c, 1] = g0 / s, g1 / s
             rms[k, c] = s**0.5
             p00, p01, p11 = p00 - g0 * g0 / s, p01 - g0 * g1 / s, p11 - g1 * g1 / s
-        p00, p01, p11 = _propagated(p00, p01, p11, process[k], dt[k], damping)
+        p00, p01, p11 = _propagate(p00, p01, p11, process[k], dt[k], damping)
 
 
 @njit(cache=True, fastmath=True, nogil=True)
@@ -128,4 +128,4 @@ def open_loop_variance(H, noise, process, dt, start, damping, out):
         for c in range(noise.shape[0]):
             h0, h1 = H[c, 0], H[c, 1]
             out[c, k] = h0 * h0 * p00 + 2.0 * h0 * h1 * p01 + h1 * h1 * p11 + noise[c, k] ** 2
-        p00, p01, p11 = _propagated(p00, p01, p11, process[k], dt[k], damping)
+        p00, p01, p11 = _propagate(p00, p01, p11, process[k], dt[k], damping)

@@ -17,7 +17,7 @@ from ema.discrepancy.plant import Point
 
 from .balance.as_effects import effects
 from .balance.found import Balance, Term
-from .screened import begun
+from .screened import begin_at
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -31,14 +31,14 @@ def excess(residuals: Sequence[Array]) -> float:
     return max(float(np.mean(np.clip(r, -WILD, WILD) ** 2)) - 1.0, 0.0)
 
 
-def support(plant: AxisPlant, point: Point, b: Balance, term: Term) -> float:
+def measure_support(plant: AxisPlant, point: Point, b: Balance, term: Term) -> float:
     """Share of the rest that a law takes in free runs at `point`, over what it takes in the balance; 0 to 1."""
     blocks = list(range(len(plant.blocks)))
     without = fit(plant, plant.base, point, blocks, max_iterations=N_ITERATIONS)
     here = excess(without.residuals)
     taken = 0.0
     for name, values in effects(b, term).items():
-        law = begun(name, values)
+        law = begin_at(name, values)
         starts = [{**point, **start} for start in law.starts]
         fitted = best_fit(plant, [*plant.base, *law.free], starts, blocks, max_iterations=N_ITERATIONS)
         taken = max(taken, 1.0 - excess(fitted.residuals) / max(here, 1e-300))

@@ -9,7 +9,7 @@ from typing import Any
 
 from ema.core.records import Record
 from ema.discrepancy import findings as shared
-from ema.discrepancy.grade import graded
+from ema.discrepancy.grade import grade
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.progress import Progress
 from ema.discrepancy.report import Picture
@@ -18,19 +18,19 @@ from ema.models import axis_config
 from ema.models.axis_config import LinearAxis
 
 from . import ripple, stamps
-from .agreeing import together
+from .agreeing import merge
 from .balance.as_effects import effects, point
 from .balance.found import Balance
-from .balance.telling import sentences, told
-from .between import examined
+from .balance.telling import describe, sentences
+from .between import examine_ways
 from .closed_loop import closed_loop
-from .dropped import dropped
-from .external import with_external
+from .dropped import list_dropped
+from .external import add_external
 from .next_records import next_records
 from .plant import AxisPlant
-from .plausible import implausible
-from .plausible import told as electrical
-from .ruling import WITNESS, ruling
+from .plausible import describe as electrical
+from .plausible import find_implausible
+from .ruling import WITNESS, rule_by_balance
 from .ruling import gain as of_balance
 
 MOVED = 0.02  # of the plant file's friction: less is not worth a word
@@ -43,7 +43,7 @@ def discrepancy(
     from .pictures import pictures
 
     plant = AxisPlant(axis_config.load(plant_file), records)
-    outcome = examined(plant, say)
+    outcome = examine_ways(plant, say)
     return findings(plant, outcome), lambda: pictures(plant, outcome)
 
 
@@ -75,21 +75,21 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     if outcome.verdict != "adequate":
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
     said = _balance(plant, outcome)
-    rules = ruling(plant, outcome)
+    rules = rule_by_balance(plant, outcome)
     if rules is not None and plant.balance is not None:
-        found, verdict = rules.effects, graded(rules.left, named=bool(rules.effects))
+        found, verdict = rules.effects, grade(rules.left, named=bool(rules.effects))
         by_balance: Balance | None = plant.balance
         gain = shared.Gain(**of_balance(plant.balance, rules.left, outcome, isinstance(plant.plant, LinearAxis)))
         notes, structure = [rules.note], {}
     else:
         follows = outcome.heldout.noise_floor <= WITNESS
         told_by_runs = [_effect(e) for e in outcome.effects]
-        found, by_balance = together(plant, told_by_runs, outcome.verdict, outcome.point, follows=follows)
-        verdict = graded(outcome.left, named=True) if by_balance is not None and outcome.left else outcome.verdict
-    found = with_external(plant, found)
+        found, by_balance = merge(plant, told_by_runs, outcome.verdict, outcome.point, follows=follows)
+        verdict = grade(outcome.left, named=True) if by_balance is not None and outcome.left else outcome.verdict
+    found = add_external(plant, found)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
-    notes += [f"implausible: {text}" for text in implausible(plant, outcome)]
-    notes += _moved(plant, outcome) + _kinds(plant) + list(ripple.said(plant)) + _zeros(plant, outcome)
+    notes += [f"implausible: {text}" for text in find_implausible(plant, outcome)]
+    notes += _moved(plant, outcome) + _kinds(plant) + list(ripple.describe(plant)) + _zeros(plant, outcome)
     return shared.Findings(
         verdict,
         found,
@@ -107,7 +107,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
 
 def _rejected(plant: AxisPlant, outcome: Outcome, named: set[str]) -> list[dict[str, Any]]:
     """What lost to the answer, in nats; and what fits clearly better beside it and is no cause."""
-    better = dropped(plant, outcome, named)
+    better = list_dropped(plant, outcome, named)
     there = {row["name"] for row in better}
     return [*better, *(row for row in outcome.lost if row["name"] not in there | named)]
 
@@ -117,7 +117,7 @@ def _balance(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
     found, linear = plant.balance, isinstance(plant.plant, LinearAxis)
     if found is None:
         return {}
-    out = told(found, linear=linear)
+    out = describe(found, linear=linear)
     if asked := next_records(out):
         out["next"] = asked
     if seen := electrical(plant):
@@ -178,7 +178,7 @@ def _kinds(plant: AxisPlant) -> list[str]:
         out.append(f"{b.name}: {how}" + (f"; noise estimated: {noise}" if noise else "") + more)
         channel = b.roles.position or b.roles.speed
         if channel and not b.static:
-            out += stamps.said(b.name, record.cycles, channel)
+            out += stamps.describe(b.name, record.cycles, channel)
     return out
 
 

@@ -17,7 +17,7 @@ from .evidence import Evidence, evidence, subset
 from .hypothesis import Array, Cause, Parameter, Point, Problem
 from .law_error import SHARES, LawError
 from .posterior import Entry, log_prior, posterior
-from .records import Pool, Simulated, simulated
+from .records import Pool, Simulated, simulate
 from .statistic import Prediction, Statistic, Whitening
 
 Say = Callable[[str], None]
@@ -141,7 +141,7 @@ class Contest:
         self.problem, self.whitening, self.n, self.say = problem, whitening, n_records, say
         moved = np.concatenate([e.columns.T for e in entrants])
         null, *others = (
-            r.features.mean(axis=0) for r in simulated(problem, [e.point for e in entrants], Pool.COLUMN, problem.grids)
+            r.features.mean(axis=0) for r in simulate(problem, [e.point for e in entrants], Pool.COLUMN, problem.grids)
         )
         directions = self.whitening.white(np.array([*moved, *(x - null for x in others)]))
         freedom = (n_records - problem.grids) * len(problem.blocks)
@@ -157,7 +157,7 @@ class Contest:
 
     def weigh(self, entrants: Sequence[Entrant]) -> list[Weighed]:
         """Simulate entrants, all at once, and integrate over all near each."""
-        records = simulated(self.problem, [e.point for e in entrants], Pool.PREDICT, self.n)
+        records = simulate(self.problem, [e.point for e in entrants], Pool.PREDICT, self.n)
         return [self._weighed(e, r) for e, r in zip(entrants, records, strict=True)]
 
     def _weighed(self, entrant: Entrant, records: Simulated) -> Weighed:
@@ -191,7 +191,7 @@ class Contest:
         for key, of in sets.items():
             if top - found[key].log_evidence < BEHIND:
                 alike = [e for e in of[1:] if e.parameters == of[0].parameters][: EXPANSIONS - 1]
-                found[key] = together([self.settled(w) for w in (found[key], *self.weigh(alike))])
+                found[key] = average([self.settled(w) for w in (found[key], *self.weigh(alike))])
         ranked = sorted(found.values(), key=lambda w: -w.log_evidence)
         error = float(np.sqrt(np.mean([w.error**2 for w in ranked[:2]])))
         return Outcome(posterior({w.entrant.names: w.log_evidence for w in ranked}, error), ranked)
@@ -207,7 +207,7 @@ class Contest:
         return w
 
 
-def together(found: Sequence[Weighed]) -> Weighed:
+def average(found: Sequence[Weighed]) -> Weighed:
     """One set of causes by several points about which its response was taken for linear.
 
     Each gives an estimate of one and the same integral: these are averaged, and sizes are those of the mixture. Where

@@ -52,7 +52,7 @@ class Simulated:
             raise OwnRecordsError(f"seeds {self.seeds} share runs with {other}: take another pool")
 
 
-def simulated(problem: Problem, points: Sequence[Point], pool: Pool, n: int) -> list[Simulated]:
+def simulate(problem: Problem, points: Sequence[Point], pool: Pool, n: int) -> list[Simulated]:
     """Records of several points, with the same seeds; what honest simulations may differ by is part of their noise."""
     of = seeds(pool, n)
     floor = problem.floors * np.array([np.random.default_rng(seed).standard_normal(len(problem.floors)) for seed in of])

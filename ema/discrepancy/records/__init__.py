@@ -5,7 +5,7 @@ record is enough for, `begin` makes the first plant file of it.
 """
 
 from .agreements import Agreement, agreements
-from .allowed import Allowed, allowed
+from .allowed import Allowed, list_allowed
 from .facts import ChannelFacts, Sampling, channels, sampling
 
-__all__ = ["Agreement", "Allowed", "ChannelFacts", "Sampling", "agreements", "allowed", "channels", "sampling"]
+__all__ = ["Agreement", "Allowed", "ChannelFacts", "Sampling", "agreements", "channels", "list_allowed", "sampling"]

@@ -28,7 +28,7 @@ class Allowed:
     obstacles: list[str]
 
 
-def allowed(record: Record, clock: Sampling, facts: list[ChannelFacts], agree: list[Agreement]) -> Allowed:
+def list_allowed(record: Record, clock: Sampling, facts: list[ChannelFacts], agree: list[Agreement]) -> Allowed:
     """What the record allows, as far as its channels show it."""
     have = set(record.channels)
     plants: dict[str, str] = {}

@@ -58,7 +58,7 @@ class Sheet:
         return {("load", "motor"): 1.0 / gear, ("motor", "load"): gear}.get(at, 1.0)
 
 
-def axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
+def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
     """Parameters of an axis from its records; RecordError where they hold no motion or no drive."""
     have = set.intersection(*(set(record.channels) for record in records))
     there = ", ".join(sorted(have))
@@ -183,7 +183,7 @@ def _number(value: float, unit: str) -> str:
     return f"{value:.4g} {unit}"
 
 
-def channels_said(records: Sequence[Record]) -> str:
+def describe_channels(records: Sequence[Record]) -> str:
     """Channels of the records with their units, for a comment."""
     names = sorted(set.union(*(set(record.channels) for record in records)))
     return ", ".join(f"{name} [{CHANNELS[name].unit}]" for name in names)

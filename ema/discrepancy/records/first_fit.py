@@ -58,7 +58,7 @@ def first_fit(records: Sequence[Record], position: str, speed: str, drive: Seque
         "drag": np.concatenate([one.integrate(one.motion.w) for one in weak]),
     }
     every = tuple(sorted({n for found in orders for n in found}))
-    return _fitted(base, own, np.concatenate([one.y for one in weak]), every)
+    return _solve(base, own, np.concatenate([one.y for one in weak]), every)
 
 
 def _weak(record: Record, position: str, speed: str, taus: Sequence[Array]) -> Weak | None:
@@ -119,7 +119,7 @@ def _own(weak: Weak, orders: tuple[float, ...]) -> Array:
     return weak.integrate(np.stack(columns, axis=1))
 
 
-def _fitted(base: dict[str, Array], own: Array, tau: Array, orders: tuple[float, ...]) -> FirstFit:
+def _solve(base: dict[str, Array], own: Array, tau: Array, orders: tuple[float, ...]) -> FirstFit:
     kept = dict(base)
     for name in ("drag", "inertia"):  # friction is what slow motion shows
         others = np.column_stack([*(x for key, x in kept.items() if key != name), own])

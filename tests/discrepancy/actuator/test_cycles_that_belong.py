@@ -10,10 +10,10 @@ import pytest
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.checks import check_rate, check_signals
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.features import Signals
 from ema.discrepancy.actuator.measured import Measured
-from ema.discrepancy.actuator.timing import samples_late
+from ema.discrepancy.actuator.timing import find_samples_late
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def signals(good, **changes):
 
 
 def test_cycles_of_one_command_are_one_motion_and_begin_where_they_begin(cycles, shipped_plant):
-    found = measured(shipped_plant, [Record(tuple(Cycle(k, c) for k, c in enumerate(cycles)))])
+    found = prepare(shipped_plant, [Record(tuple(Cycle(k, c) for k, c in enumerate(cycles)))])
     assert isinstance(found, Measured)
     assert found.n_cycles == len(cycles) == len(found.y) == len(found.envelopes)
     assert found.motion.tolist() == [0, 1, 0]
@@ -134,7 +134,7 @@ def found_late(by, beside=0.0):
         of=lambda c: SimpleNamespace(white=lambda x: x),
         misfit=lambda left, cycles: sum(float(r @ r) for r in left) / 500,
     )
-    late = samples_late(plant, noise, {}, [0])
+    late = find_samples_late(plant, noise, {}, [0])
     assert plant.late == 0  # as it was
     return late
 

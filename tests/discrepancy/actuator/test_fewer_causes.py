@@ -10,12 +10,12 @@ from ema.discrepancy.actuator.candidates import Candidate
 from ema.discrepancy.actuator.free import K_FREE, free
 from ema.discrepancy.actuator.model import Model
 from ema.discrepancy.actuator.simpler import (
-    simpler,
-    still_alike,
-    with_fewer_faults,
-    with_temperature_only,
-    with_zero,
-    without_common_faults,
+    drop_common_faults,
+    drop_constant_parts,
+    drop_faults,
+    keep_alike,
+    simplify,
+    take_resolver_zero,
 )
 
 NOISE, NO_NOISE = SimpleNamespace(is_noise=True, p_value=0.5), SimpleNamespace(is_noise=False, p_value=1e-6)
@@ -78,18 +78,18 @@ def test_a_magnet_can_be_taken_for_several_shorts():
 
 
 def test_what_faults_have_in_common_is_taken_from_all_of_them():
-    made = without_common_faults(Search(), fitted((FLUX,), SHORTS), FLUX)
+    made = drop_common_faults(Search(), fitted((FLUX,), SHORTS), FLUX)
     point, free_now = made.fit.point, {f.name for f in made.fit.free}
     assert [point[name] for name in OF_FLUX] == pytest.approx([0.0, 0.0, 0.03])
     assert free_now & set(OF_FLUX) == {OF_FLUX[-1]}
     nothing_common = {**SHORTS, OF_FLUX[0]: 0.004}
-    assert without_common_faults(Search(), fitted((FLUX,), nothing_common), FLUX) is None
-    assert without_common_faults(Search(), fitted((DRAG,), {"k1": 0.1, "viscous_drag.coefficient": 1e-5}), DRAG) is None
+    assert drop_common_faults(Search(), fitted((FLUX,), nothing_common), FLUX) is None
+    assert drop_common_faults(Search(), fitted((DRAG,), {"k1": 0.1, "viscous_drag.coefficient": 1e-5}), DRAG) is None
 
 
 def test_faults_go_where_their_effect_does_as_well_without_them():
     before, model, alike = fitted((), {}, 9.0), fitted((FLUX,), SHORTS), [()]
-    found, v = with_fewer_faults(Search(), before, model, NOISE, alike)
+    found, v = drop_faults(Search(), before, model, NOISE, alike)
     assert v is NOISE
     assert n_free(found) == n_free(model) - 2
     assert alike == [(f"{OF_FLUX[0]} and {OF_FLUX[1]} alike",)]
@@ -98,18 +98,18 @@ def test_faults_go_where_their_effect_does_as_well_without_them():
 def test_faults_stay_where_more_is_left_without_them_or_the_model_is_far_from_right():
     before, model = fitted((), {}, 9.0), fitted((FLUX,), SHORTS)
     needs_all = Search(lambda m: 1.0 if n_free(m) == n_free(model) else 1.2)
-    assert with_fewer_faults(needs_all, before, model, NOISE, [()])[0] is model
+    assert drop_faults(needs_all, before, model, NOISE, [()])[0] is model
     far = fitted((FLUX,), SHORTS, heldout=4.0)
     untouched = Search()
-    assert with_fewer_faults(untouched, before, far, NO_NOISE, [()])[0] is far
+    assert drop_faults(untouched, before, far, NO_NOISE, [()])[0] is far
     assert untouched.made == []
     no_longer_noise = Search(verdict=NO_NOISE)
-    assert with_fewer_faults(no_longer_noise, before, model, NOISE, [()])[0] is model
+    assert drop_faults(no_longer_noise, before, model, NOISE, [()])[0] is model
 
 
 def test_where_much_is_left_nothing_simpler_is_looked_for():
     before, far = fitted((), {}, 9.0), fitted((DRAG,), {"viscous_drag.coefficient": 1e-5}, heldout=4.0)
-    assert simpler(Search(), before, far, NO_NOISE, [()], [])[0] is far
+    assert simplify(Search(), before, far, NO_NOISE, [()], [])[0] is far
 
 
 @pytest.mark.parametrize(("constant", "gone"), [(0.01, True), (0.05, False)])
@@ -117,7 +117,7 @@ def test_a_constant_part_that_may_be_nothing_goes(constant, gone):
     """Its deviation is 0.01: one deviation may be nothing, five may not."""
     point = {"magnet_flux.change": constant, "magnet_flux.per_kelvin": -1e-3}
     model = fitted((WARM,), point, sd={"magnet_flux.change": 0.01, "magnet_flux.per_kelvin": 1e-5})
-    found, _ = with_temperature_only(Search(), model, NOISE)
+    found, _ = drop_constant_parts(Search(), model, NOISE)
     assert (found.effects[0].linear == ("per_kelvin",)) == gone
     assert (found.fit.point["magnet_flux.change"] == 0.0) == gone
 
@@ -126,29 +126,29 @@ def test_a_constant_part_stays_where_it_is_missed():
     point = {"magnet_flux.change": 0.01, "magnet_flux.per_kelvin": -1e-3}
     model = fitted((WARM,), point, sd={"magnet_flux.change": 0.01, "magnet_flux.per_kelvin": 1e-5})
     missed = Search(lambda m: 1.0 if "magnet_flux.change" in {f.name for f in m.fit.free} else 1.2)
-    assert with_temperature_only(missed, model, NOISE)[0] is model
+    assert drop_constant_parts(missed, model, NOISE)[0] is model
     plain = fitted((FLUX,), SHORTS, sd={"magnet_flux.change": 1.0})
-    assert with_temperature_only(Search(), plain, NOISE)[0] is plain
+    assert drop_constant_parts(Search(), plain, NOISE)[0] is plain
 
 
 def test_a_zero_of_two_sensors_may_be_the_commutation():
     model = fitted((), {})
     alike = []
-    found, _ = with_zero(Search(zero=1e-4), model, NOISE, alike)
+    found, _ = take_resolver_zero(Search(zero=1e-4), model, NOISE, alike)
     assert found.names == ("commutation_offset",)
     assert found.fit.point["commutation_offset.angle"] == pytest.approx(2 * 500.0 * 1e-4, rel=0.01)
     assert alike == [("a zero of theta_u",)]
     better, alike = Search(lambda m: 1.0 if m.names else 1.3, zero=1e-4), []
-    with_zero(better, model, NOISE, alike)
+    take_resolver_zero(better, model, NOISE, alike)
     assert alike == [()]  # nothing else would do
 
 
 def test_a_zero_within_a_step_of_the_sensor_needs_no_cause():
     model = fitted((), {})
-    assert with_zero(Search(zero=1e-7), model, NOISE, [])[0] is model
-    assert with_zero(Search(zero=1e-4), model, NO_NOISE, [])[0] is model
+    assert take_resolver_zero(Search(zero=1e-7), model, NOISE, [])[0] is model
+    assert take_resolver_zero(Search(zero=1e-4), model, NO_NOISE, [])[0] is model
     worse = Search(lambda m: 1.2 if m.names else 1.0, zero=1e-4)
-    assert with_zero(worse, model, NOISE, [])[0] is model
+    assert take_resolver_zero(worse, model, NOISE, [])[0] is model
 
 
 def test_a_rival_stays_one_only_if_it_does_as_well_beside_what_was_found_later():
@@ -156,5 +156,5 @@ def test_a_rival_stays_one_only_if_it_does_as_well_beside_what_was_found_later()
     as_well = fitted((candidate("inertia", "change"),), {}, heldout=1.0)
     no_longer = fitted((candidate("current_gain", "gain_a"),), {}, heldout=1.5)
     search = Search(tried=[as_well, no_longer])
-    assert still_alike(search, model, 0, ("inertia", "current_gain", "viscous_drag")) == ("inertia",)
-    assert still_alike(search, model, 1, ("current_gain",)) == ("current_gain",)  # the last was held against them
+    assert keep_alike(search, model, 0, ("inertia", "current_gain", "viscous_drag")) == ("inertia",)
+    assert keep_alike(search, model, 1, ("current_gain",)) == ("current_gain",)  # the last was held against them

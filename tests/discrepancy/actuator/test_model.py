@@ -7,7 +7,7 @@ import pytest
 from ema.discrepancy.actuator.candidates import Candidate
 from ema.discrepancy.actuator.fit import Fit
 from ema.discrepancy.actuator.free import K_FREE, free
-from ema.discrepancy.actuator.model import Model, stripped
+from ema.discrepancy.actuator.model import Model, strip
 from ema.discrepancy.actuator.weighing import is_alike, is_credible, is_enough
 
 
@@ -39,7 +39,7 @@ def test_a_magnet_stands_for_shorts_of_all_phases_together_and_drag_for_none():
 
 def test_an_effect_is_taken_out_with_its_parameters_and_no_other():
     both = model(FLUX, DRAG, magnet_flux__change=-0.05, viscous_drag__coefficient=1e-5, k1=0.02)
-    effects, frees, point = stripped(both, FLUX)
+    effects, frees, point = strip(both, FLUX)
     assert effects == (DRAG,)
     assert point == {"viscous_drag.coefficient": 1e-5, "k1": 0.02}
     assert [f.name for f in frees] == [*(f.name for f in K_FREE), "viscous_drag.coefficient"]

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ema.discrepancy.actuator.supply import DOUBT, LIKE, resolved
+from ema.discrepancy.actuator.supply import DOUBT, LIKE, resolve
 
 AT = [slice(2, 50)]
 
@@ -23,14 +23,14 @@ def record(n: int, scatter: float, swing: float, quantum: float = 0.0):
 
 
 def test_a_voltage_is_known_as_well_as_repetitions_agree():
-    assert resolved(record(6, 1e-3, 0.0), AT) == pytest.approx(DOUBT * 1e-3, rel=0.2)
-    assert resolved(record(6, 1e-6, 0.5), AT) == pytest.approx(LIKE * 0.5, rel=0.01)
+    assert resolve(record(6, 1e-3, 0.0), AT) == pytest.approx(DOUBT * 1e-3, rel=0.2)
+    assert resolve(record(6, 1e-6, 0.5), AT) == pytest.approx(LIKE * 0.5, rel=0.01)
 
 
 def test_a_coarse_converter_hides_what_repetitions_have_alike():
-    assert resolved(record(6, 1e-6, 0.0, quantum=0.1), AT) == pytest.approx(0.1 / np.sqrt(12.0), rel=0.01)
+    assert resolve(record(6, 1e-6, 0.0, quantum=0.1), AT) == pytest.approx(0.1 / np.sqrt(12.0), rel=0.01)
 
 
 @pytest.mark.parametrize("cycles", [record(1, 1e-3, 0.1), record(4, 0.0, 0.0)], ids=["once", "constant"])
 def test_where_no_repetition_tells_nothing_is_told(cycles):
-    assert resolved(cycles, AT) is None
+    assert resolve(cycles, AT) is None

@@ -9,7 +9,7 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator import telling
-from ema.discrepancy.actuator.cycles import measured
+from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examination import Examination
 from ema.discrepancy.actuator.features import features, slices
 from ema.discrepancy.actuator.model import Model
@@ -63,7 +63,7 @@ def test_what_lost_is_told_by_evidence_where_it_was_weighed_and_else_by_held_out
     ]  # fmt: skip
     outcome = Outcome([], [weighed(("viscous_drag",), 10.0, 0.3), weighed(("inertia",), -31.2, 0.4)])
     search = SimpleNamespace(tried=tried, heldout=[1])
-    rows = {row["name"]: row for row in telling.rejected(search, before, answer, outcome)}
+    rows = {row["name"]: row for row in telling.describe_rejected(search, before, answer, outcome)}
     assert list(rows) == ["inertia", "cogging", "spring_load"]  # what leaves least first; not the answer, not faults
     assert (rows["inertia"]["nats"], rows["inertia"]["nats_of"]) == (pytest.approx(41.2), "evidence")
     assert rows["inertia"]["nats_error"] == pytest.approx(0.5)
@@ -78,7 +78,7 @@ def test_of_a_set_that_was_likelier_it_is_said_that_it_is_before():
     answer = named("viscous_drag")
     outcome = Outcome([], [weighed(("viscous_drag",), 0.0), weighed(("inertia",), 3.0)])
     search = SimpleNamespace(tried=[named("inertia")], heldout=[1])
-    (row,) = telling.rejected(search, named(heldout=9.0), answer, outcome)
+    (row,) = telling.describe_rejected(search, named(heldout=9.0), answer, outcome)
     assert row["nats"] == pytest.approx(-3.0)
     assert "3.0 ± 0.4 nats before viscous_drag" in row["why"]
 
@@ -111,7 +111,7 @@ def found(sd_fit, sd_score, rest, of=("viscous_drag",)):
     parameter = SimpleNamespace(name=name)
     own.entrant.causes = (SimpleNamespace(name="viscous_drag", parameters=(parameter,)),)
     outcome = Outcome([Entry(of, 1.0, 0.0, 0.0)], [own])
-    return telling._found(None, answer, "viscous_drag", (), rest, outcome)
+    return telling._describe_effect(None, answer, "viscous_drag", (), rest, outcome)
 
 
 def test_an_interval_is_as_wide_as_what_is_left_and_as_the_wider_of_fit_and_score():
@@ -136,7 +136,7 @@ def test_an_interval_is_as_wide_as_what_is_left_and_as_the_wider_of_fit_and_scor
 def examined(hidden, shipped_plant):
     """A search whose simulation gives the record itself, less a little: nothing is simulated."""
     cycles = hidden.cycles(hidden.Flaws(), 4, 1, motions=(hidden.chirp(), hidden.triangle(4e-3, 3.0, 0.5)))
-    data = measured(shipped_plant, [Record(tuple(Cycle(k, c) for k, c in enumerate(cycles)))])
+    data = prepare(shipped_plant, [Record(tuple(Cycle(k, c) for k, c in enumerate(cycles)))])
     groups = [features(shipped_plant, data.signals[c]) for c in (0, 1)]
 
     class Echo:

@@ -11,16 +11,16 @@ from balance_on_paper import F_D, PLAIN, C, J, N, acting, motion, rows
 
 from ema.discrepancy.axis.balance.along import LINES
 from ema.discrepancy.axis.balance.apart import apart, by_record
-from ema.discrepancy.axis.balance.choice import chosen
+from ema.discrepancy.axis.balance.choice import choose_laws
 from ema.discrepancy.axis.balance.course import Course
-from ema.discrepancy.axis.balance.drifting import drifting
+from ema.discrepancy.axis.balance.drifting import drift_laws
 from ema.discrepancy.axis.balance.found import Balance
 from ema.discrepancy.axis.balance.law import BY_RECORD, Law, one
 from ema.discrepancy.axis.balance.laws import laws
 from ema.discrepancy.axis.balance.links import links
-from ema.discrepancy.axis.balance.memory import remembering
-from ema.discrepancy.axis.balance.regression import fitted
-from ema.discrepancy.axis.balance.sampled import joined
+from ema.discrepancy.axis.balance.memory import memory_laws
+from ema.discrepancy.axis.balance.regression import regress
+from ema.discrepancy.axis.balance.sampled import join
 from ema.discrepancy.axis.balance.units import LINEAR, ROTARY, of_base
 from ema.discrepancy.axis.balance.widths import half_widths
 
@@ -53,7 +53,7 @@ def test_a_law_beside_inertia_friction_and_drag_is_fitted_to_the_last_digit(key)
     m = motion()
     (law,) = (law for law in laws(m, linear=False) if law.key == key)
     c = 0.02 * np.arange(1, law.n_columns + 1)
-    found = fitted(
+    found = regress(
         rows(m, torque=sum(x * column for x, column in zip(c, law.columns(m, acting(m)), strict=True))), PLAIN, [law]
     )
     assert found.coefficients[found.part(law)] == pytest.approx(c, rel=1e-6)
@@ -67,7 +67,7 @@ def test_intervals_of_coefficients_hold_their_noise():
         made = rows(m)
         y = made.y + F_D * (made.integrate @ m.direction) + C * (made.integrate @ m.w)
         noise = 0.05 * np.random.default_rng(seed).standard_normal(len(y))
-        found = fitted(replace(made, y=y + noise, known={}), PLAIN, [])
+        found = regress(replace(made, y=y + noise, known={}), PLAIN, [])
         inside += int((np.abs(found.coefficients - truth) < 2.0 * np.sqrt(np.diag(found.covariance()))).sum())
     assert 0.85 * 120 < inside <= 120  # 95 % of three coefficients in forty
 
@@ -75,10 +75,10 @@ def test_intervals_of_coefficients_hold_their_noise():
 def test_nothing_is_chosen_where_nothing_acts_and_a_drag_where_one_does():
     m = motion()
     every = [law for law in laws(m, linear=False) if law.family not in LINES]
-    nothing = chosen(rows(m, noise=0.01), PLAIN, every)
+    nothing = choose_laws(rows(m, noise=0.01), PLAIN, every)
     assert isinstance(nothing, Balance)
     assert nothing.terms == ()
-    (term,) = chosen(rows(m, torque=2e-3 * m.w * np.abs(m.w), noise=0.01), PLAIN, every).terms
+    (term,) = choose_laws(rows(m, torque=2e-3 * m.w * np.abs(m.w), noise=0.01), PLAIN, every).terms
     assert term.law.key == "quadratic drag"
     assert term.wins > 0.95
 
@@ -92,7 +92,7 @@ def test_a_law_by_record_is_the_shared_one_cut_in_two():
     assert a + b == pytest.approx(m.w**2)
     assert (a * b == 0.0).all()
     assert own.values(np.array([1.0, 3.0])) == {"c": 2.0}
-    found = fitted(rows(m, torque=np.where(m.record == 0, 0.01, 0.03) * m.w**2), PLAIN, [own])
+    found = regress(rows(m, torque=np.where(m.record == 0, 0.01, 0.03) * m.w**2), PLAIN, [own])
     assert found.coefficients[found.part(own)] == pytest.approx([0.01, 0.03], rel=1e-6)
 
 
@@ -111,18 +111,18 @@ def test_what_differs_between_records_needs_two_and_keeps_the_mean():
 
 def test_temperature_and_reversals_are_asked_for_only_where_they_are():
     m = motion()
-    names = {law.name for law in drifting(m, "N m", "rad")}
+    names = {law.name for law in drift_laws(m, "N m", "rad")}
     assert {"friction_by_temperature", "viscous_by_temperature", "magnet_flux"} <= names
-    cold = {law.name for law in drifting(replace(m, dT=np.zeros(N)), "N m", "rad")}
+    cold = {law.name for law in drift_laws(replace(m, dT=np.zeros(N)), "N m", "rad")}
     assert cold == {"friction_drift", "viscous_drift"}
-    assert list(remembering(m, "N m", "rad"))
+    assert list(memory_laws(m, "N m", "rad"))
     one_way = replace(m, theta=m.t * 3.0, w=np.full(N, 3.0), direction=np.ones(N))
-    assert list(remembering(one_way, "N m", "rad")) == []
+    assert list(memory_laws(one_way, "N m", "rad")) == []
 
 
 def test_friction_with_memory_lacks_least_long_after_a_reversal():
     m = motion()
-    law = next(iter(remembering(m, "N m", "rad")))
+    law = next(iter(memory_laws(m, "N m", "rad")))
     (lacks,) = law.columns(m, acting(m))
     turned = np.flatnonzero(np.diff(m.direction) != 0.0) + 1
     assert np.abs(lacks[turned]).min() > 1.5  # friction still acts the old way
@@ -145,17 +145,17 @@ def test_test_functions_are_as_wide_as_noise_wants_them():
 
 def test_motions_are_joined_end_to_end():
     m = motion()
-    both = joined([m, m])
+    both = join([m, m])
     assert both.w == pytest.approx(np.concatenate([m.w, m.w]))
     assert both.neighbour == "outer"
-    assert joined([m, replace(m, neighbour="")]).neighbour == ""
+    assert join([m, replace(m, neighbour="")]).neighbour == ""
 
 
 def test_a_record_at_rest_leaves_its_inertia_open():
     moving = motion()
     rests = moving.record == 1
     still = replace(moving, a=np.where(rests, 0.0, moving.a), w=np.where(rests, 0.0, moving.w))
-    fit = fitted(rows(still, noise=1e-4), PLAIN, [], apart=True)
+    fit = regress(rows(still, noise=1e-4), PLAIN, [], apart=True)
     covariance = dict(zip(fit.base, np.diag(fit.covariance()), strict=True))
     at = {name: value for name, value in covariance.items() if name.startswith("inertia")}
     first, last = at.values()

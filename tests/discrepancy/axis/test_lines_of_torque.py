@@ -8,7 +8,7 @@ import pytest
 
 from ema.discrepancy.axis.cogging import cogging_candidate
 from ema.discrepancy.axis.naming import line, torque_line
-from ema.discrepancy.axis.predictable import LONGEST_WINDOW, N_GROWTHS, predictable
+from ema.discrepancy.axis.predictable import LONGEST_WINDOW, N_GROWTHS, predictable_time
 from ema.discrepancy.axis.zeros import zeros
 
 SIZE, ORDER, PHASE = 0.01, 12, 0.7
@@ -87,15 +87,15 @@ def test_records_without_a_line_have_no_zero_and_one_record_has_none(quiet):
 
 def test_windows_are_as_long_as_deviations_may_grow(quiet, rippled):
     """Beside the crest of A sin nθ it grows as exp(t √(A n / J)); where friction falls by F, as exp(t F / (J ω_s))."""
-    assert predictable(quiet, quiet.benches[0]) == LONGEST_WINDOW
+    assert predictable_time(quiet, quiet.benches[0]) == LONGEST_WINDOW
     growth = np.sqrt(SIZE * ORDER / on_paper.J)
-    assert predictable(rippled, rippled.benches[0]) == pytest.approx(N_GROWTHS / growth, rel=0.02)
+    assert predictable_time(rippled, rippled.benches[0]) == pytest.approx(N_GROWTHS / growth, rel=0.02)
     plant = on_paper.plant(on_paper.cycle(falling))
     growth = 0.02 / (on_paper.J * 0.5)
-    assert predictable(plant, plant.benches[0]) == pytest.approx(N_GROWTHS / growth, rel=0.5)
+    assert predictable_time(plant, plant.benches[0]) == pytest.approx(N_GROWTHS / growth, rel=0.5)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_noise_that_looks_like_falling_friction_shortens_no_window(seed):
     plant = on_paper.plant(on_paper.cycle(seed=seed, noise=400.0))
-    assert predictable(plant, plant.benches[0]) == LONGEST_WINDOW
+    assert predictable_time(plant, plant.benches[0]) == LONGEST_WINDOW

@@ -12,7 +12,7 @@ from balance_on_paper import PLAIN, motion, rows
 from ema.discrepancy.axis.balance.choice import _is_ruled_out
 from ema.discrepancy.axis.balance.law import BY_RECORD, Law, one
 from ema.discrepancy.axis.balance.needed import ALARM, Asked, chance, families_held, is_needed
-from ema.discrepancy.axis.balance.regression import fitted
+from ema.discrepancy.axis.balance.regression import regress
 
 M = motion()
 NOISE = 0.01
@@ -38,7 +38,7 @@ def asked(found, *every):
 
 
 def models(found, *laws):
-    return fitted(found, PLAIN, laws), fitted(found, PLAIN, [])
+    return regress(found, PLAIN, laws), regress(found, PLAIN, [])
 
 
 def test_by_chance_alone_a_law_is_no_chance_as_often_as_p_says():
@@ -62,7 +62,7 @@ def test_a_law_that_acts_is_needed_and_one_that_does_not_is_not():
     found = made(2e-3 * M.w * np.abs(M.w))
     new, old = models(found, DRAG)
     assert is_needed(new, old, asked(found, DRAG))
-    beside = fitted(found, PLAIN, [DRAG, SPRING])
+    beside = regress(found, PLAIN, [DRAG, SPRING])
     assert not is_needed(beside, new, asked(found, DRAG, SPRING))
 
 
@@ -105,7 +105,7 @@ def test_of_two_that_each_act_in_a_part_of_the_blocks_none_is_clearly_better():
     one_, two = (law(f"{f} Hz", lambda m, f=f: np.sin(2.0 * np.pi * f * m.t)) for f in (7, 9))
     first = M.t < 0.72 * M.t[-1]
     found = made(np.where(first, one_.columns(M, None)[0], two.columns(M, None)[0]) * 0.05)
-    better, worse = fitted(found, PLAIN, [one_]), fitted(found, PLAIN, [two])
+    better, worse = regress(found, PLAIN, [one_]), regress(found, PLAIN, [two])
     assert worse.loss - better.loss > 0.1 * worse.loss
     assert not is_needed(better, worse, asked(found, one_, two))
 
@@ -131,11 +131,11 @@ def test_a_law_that_is_in_the_model_already_adds_nothing():
     found = made(2e-3 * M.w * np.abs(M.w))
     new, _ = models(found, DRAG)
     twice = law("twice", lambda m: 2.0 * m.w * np.abs(m.w))
-    assert chance(fitted(found, PLAIN, [DRAG, twice]), new, [twice]) == 1.0
+    assert chance(regress(found, PLAIN, [DRAG, twice]), new, [twice]) == 1.0
 
 
 def ruled_out(found, own, other):
-    return _is_ruled_out(found, PLAIN, fitted(found, PLAIN, [own]), own, fitted(found, PLAIN, [other]))
+    return _is_ruled_out(found, PLAIN, regress(found, PLAIN, [own]), own, regress(found, PLAIN, [other]))
 
 
 def test_a_rival_that_is_idle_beside_the_law_is_ruled_out_and_never_the_other_way_round():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ema.discrepancy.axis.balance.as_effects import effects
-from ema.discrepancy.axis.balance.telling import told
+from ema.discrepancy.axis.balance.telling import describe
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models import axis
 from ema.models.axis_config import RotaryAxis
@@ -24,7 +24,7 @@ def test_its_gravity_is_told_at_the_motor_with_the_turns_of_the_load(support):
     channels = {**cycle.channels, "theta_m": GEAR * cycle["theta_m"], "w_m": GEAR * cycle["w_m"]}
     file = {**module.plant(build), "J": build.J / GEAR**2, "F_d": build.F / GEAR, "gear": GEAR, "torque_at": "load"}
     plant = AxisPlant(RotaryAxis.model_validate(file), [replace(record, cycles=(replace(cycle, channels=channels),))])
-    (term,) = told(plant.balance, linear=False)["terms"]
+    (term,) = describe(plant.balance, linear=False)["terms"]
     gravity = term["parameters"]["amplitude"]
     assert term["name"] == "pendulum"
     assert term["confidence"] > 0.9

@@ -7,8 +7,8 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.ruling import ruling
-from ema.discrepancy.grade import graded
+from ema.discrepancy.axis.ruling import rule_by_balance
+from ema.discrepancy.grade import grade
 from ema.models.axis_config import RotaryAxis
 
 QUIET = {"noise": 0.01, "spikes": 0.0, "speed_noise": 0.01}
@@ -34,25 +34,25 @@ def as_free_runs_had(verdict, noise=0.5):
 
 def test_a_law_that_free_runs_are_blind_to_is_named_by_the_balance_which_says_so(short_pendulum):
     plant = plant_of(short_pendulum)
-    said = ruling(plant, as_free_runs_had("adequate"))
+    said = rule_by_balance(plant, as_free_runs_had("adequate"))
     assert [e.name for e in said.effects] == ["pendulum"]
     assert "not of free runs" in said.note
-    assert graded(said.left, named=True) in ("explained", "partly explained")
+    assert grade(said.left, named=True) in ("explained", "partly explained")
 
 
 def test_free_runs_that_follow_the_motion_and_leave_noise_keep_their_verdict(short_pendulum):
     plant = plant_of(short_pendulum)
     assert [t.law.name for t in plant.balance.terms] == ["pendulum"]
-    assert ruling(plant, as_free_runs_had("adequate", noise=0.01)) is None
+    assert rule_by_balance(plant, as_free_runs_had("adequate", noise=0.01)) is None
 
 
 def test_where_the_balance_needs_no_law_free_runs_keep_their_verdict(short_pendulum):
     plant = plant_of(short_pendulum, G=0.0)
-    assert ruling(plant, as_free_runs_had("adequate")) is None
+    assert rule_by_balance(plant, as_free_runs_had("adequate")) is None
 
 
 def test_free_runs_that_are_worse_with_a_law_refute_it(short_pendulum):
     plant, other = plant_of(short_pendulum, G=0.0, **QUIET), plant_of(short_pendulum, **QUIET)
     assert [t.law.name for t in other.balance.terms] == ["pendulum"]
     plant._balances[plant.between] = other.balance  # of another axis
-    assert ruling(plant, as_free_runs_had("adequate")) is None
+    assert rule_by_balance(plant, as_free_runs_had("adequate")) is None

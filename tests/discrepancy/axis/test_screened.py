@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from ema.discrepancy.axis.screened import screened
+from ema.discrepancy.axis.screened import suggest_by_balance
 
 MOTOR, LOAD = "quadratic_load_friction", "quadratic_output_load_friction"
 
@@ -19,7 +19,7 @@ def plant(support):
 
 
 def tried(plant, balance, point=()):
-    return {c.key: c for c in screened(balance, plant.plant, dict(point))}
+    return {c.key: c for c in suggest_by_balance(balance, plant.plant, dict(point))}
 
 
 def test_a_law_that_the_balance_cannot_tell_from_its_own_is_tried_too(plant):

@@ -10,7 +10,7 @@ from types import ModuleType
 
 import pytest
 
-from ema.discrepancy.axis.balance.telling import told
+from ema.discrepancy.axis.balance.telling import describe
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
@@ -25,7 +25,7 @@ def short_pendulum(support) -> ModuleType:
 def balance_of(module, seed, **hidden):
     build = module.Pendulum(**hidden)
     plant = AxisPlant(RotaryAxis.model_validate(module.plant(build)), [module.record(build, seed)])
-    return told(plant.balance, linear=False)
+    return describe(plant.balance, linear=False)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -12,7 +12,7 @@ import pytest
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.channels import roles
-from ema.discrepancy.axis.intake import SHORTEST, asked, intake, of_loop
+from ema.discrepancy.axis.intake import SHORTEST, ask_of_loop, of_loop, take_in
 from ema.discrepancy.axis.sizes import WARMING, sizes
 from ema.models.axis_config import PositionLoop, RotaryAxis
 
@@ -33,7 +33,7 @@ def swing():
 
 
 def only(plant, *records):
-    ((cycle,),) = (r.cycles for r in intake(plant, records))
+    ((cycle,),) = (r.cycles for r in take_in(plant, records))
     return cycle
 
 
@@ -44,7 +44,7 @@ def test_a_duty_cycle_is_a_share_of_the_supply(swing):
     assert only(VOLTAGE, record(duty=duty, u_dc=sagging))["u_q"] == pytest.approx(sagging * duty)
     without = VOLTAGE.model_copy(update={"V_dc": None})
     with pytest.raises(RecordError, match="duty is a share of the supply"):
-        intake(without, [record(duty=duty)])
+        take_in(without, [record(duty=duty)])
 
 
 @pytest.mark.parametrize(("torque_at", "measured_at", "factor"), [("motor", "load", 20.0), ("load", "motor", 0.05)])
@@ -75,7 +75,7 @@ def test_what_a_loop_asks_for_drives_only_where_no_current_is_recorded(swing):
     u = np.cos(swing["t"])
     assert "duty" not in only(RotaryAxis.model_validate({**BASE, **by_duty}), record(u_q=u))
     with pytest.raises(RecordError, match="needs the channel theta_ref"):
-        asked(looped, looped.position_loop, swing, "bench")
+        ask_of_loop(looped, looped.position_loop, swing, "bench")
 
 
 def test_a_current_that_is_off_is_none_and_of_a_voltage_that_is_off_nothing_is_known(swing):
@@ -84,12 +84,12 @@ def test_a_current_that_is_off_is_none_and_of_a_voltage_that_is_off_nothing_is_k
     off = only(CURRENT, record(enabled=on))
     assert (off["i_q"][1000:1500] == 0.0).all()
     assert np.array_equal(off["i_q"][:1000], swing["i_q"][:1000])
-    (parts,) = (r.cycles for r in intake(VOLTAGE, [record(u_q=np.cos(swing["t"]), enabled=on)]))
+    (parts,) = (r.cycles for r in take_in(VOLTAGE, [record(u_q=np.cos(swing["t"]), enabled=on)]))
     assert [c.n_samples for c in parts] == [1000, len(on) - 1500]
     assert len({c.number for c in parts}) == 2
     on[: -SHORTEST + 1] = 0.0
     on[-SHORTEST + 1 :] = 1.0
-    (parts,) = (r.cycles for r in intake(VOLTAGE, [record(u_q=np.cos(swing["t"]), enabled=on)]))
+    (parts,) = (r.cycles for r in take_in(VOLTAGE, [record(u_q=np.cos(swing["t"]), enabled=on)]))
     assert len(parts) == 0
 
 

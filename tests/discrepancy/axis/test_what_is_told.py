@@ -13,10 +13,10 @@ from balance_on_paper import PLAIN, J, motion, rows
 from ema.discrepancy.axis.balance.agreement import agreements
 from ema.discrepancy.axis.balance.attenuation import attenuation
 from ema.discrepancy.axis.balance.course import courses
-from ema.discrepancy.axis.balance.integrated import rows as rows_of
+from ema.discrepancy.axis.balance.integrated import integrate_rows as rows_of
 from ema.discrepancy.axis.balance.laws import laws
 from ema.discrepancy.axis.balance.of_records import plain_of
-from ema.discrepancy.axis.balance.regression import fitted
+from ema.discrepancy.axis.balance.regression import regress
 from ema.discrepancy.axis.balance.telling_records import by_record
 from ema.discrepancy.axis.balance.widths import half_widths
 from ema.discrepancy.axis.describe import effects
@@ -109,7 +109,7 @@ def of_two_records(torque):
     m = motion()
     found = replace(rows(m, torque(m), noise=2e-3), known={})
     (law,) = (law for law in laws(m, linear=False) if law.key == "quadratic drag")
-    return agreements(found, PLAIN, fitted(found, PLAIN, [law]))
+    return agreements(found, PLAIN, regress(found, PLAIN, [law]))
 
 
 def told_of(torque, linear=False):
@@ -145,7 +145,7 @@ def test_a_law_that_one_record_has_is_seen_in_that_alone():
 def test_of_one_record_nothing_is_compared():
     m = replace(motion(), record=np.zeros(6000, int), records=("one",))
     found = replace(rows(m), record=np.zeros(600, int))
-    assert by_record(agreements(found, PLAIN, fitted(found, PLAIN, [])), ("one",), linear=False) == []
+    assert by_record(agreements(found, PLAIN, regress(found, PLAIN, [])), ("one",), linear=False) == []
 
 
 def corrected_of(times):
@@ -155,7 +155,7 @@ def corrected_of(times):
     halves = {name: 0.006 for name in half_widths(own)}  # narrow, so that noise is felt
     plain = plain_of(plant.plant)
     found = rows_of(plant, own, halves)
-    model = fitted(found, plain, [])
+    model = regress(found, plain, [])
     return model, attenuation(plant, own, halves, plain, model, 0.0)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from ema.discrepancy.axis.noise_model import noise_model, position_noise, without_start
 from ema.discrepancy.axis.pack import MEMORY, Pack
-from ema.discrepancy.axis.whitening import design, joined, open_loop_variance
+from ema.discrepancy.axis.whitening import design, join, open_loop_variance
 
 H = np.array([[1.0, 0.0], [0.0, 1.0]])  # angle and speed
 DAMPING, N = 200.0, 3000
@@ -63,7 +63,7 @@ def test_what_a_missing_torque_makes_is_no_innovation():
 def test_windows_whitened_together_are_as_each_alone():
     runs = [deviating(seed, 200, (0.3, 2.0)) for seed in (1, 2)]
     alone = [filter_for(t).whiten(residual) for t, residual in runs]
-    together = joined([filter_for(t) for t, _ in runs]).whiten(np.concatenate([r for _, r in runs], axis=1))
+    together = join([filter_for(t) for t, _ in runs]).whiten(np.concatenate([r for _, r in runs], axis=1))
     assert together == pytest.approx(np.concatenate(alone, axis=1))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from ema.discrepancy.engine.contest import Contest, Entrant, Outcome
 from ema.discrepancy.engine.posterior import p_cause
-from ema.discrepancy.engine.records import OwnRecordsError, Pool, seeds, simulated
+from ema.discrepancy.engine.records import OwnRecordsError, Pool, seeds, simulate
 from ema.discrepancy.engine.statistic import Prediction, Root, Statistic, shrinkage, shrunk_correlation
 
 NAMES = ("a", "b", "c")
@@ -84,9 +84,9 @@ def test_what_a_grid_makes_of_all_blocks_is_part_of_the_noise(toys):
     toy = toys.plant(1, NAMES, seed=1, grids=4, of_grid=of_grid)
     whitening = toy.whitening()
     statistic = Statistic.of(whitening, whitening.white(np.array(list(toy.columns.values()))).T, 48)
-    (many,) = simulated(toy, [{}], Pool.COLUMN, 4000)
+    (many,) = simulate(toy, [{}], Pool.COLUMN, 4000)
     true = np.cov(statistic(many.features)[0].T)
-    (few,) = simulated(toy, [{}], Pool.PREDICT, 64)
+    (few,) = simulate(toy, [{}], Pool.PREDICT, 64)
     found = Prediction.of(statistic, few, toy.measured).covariance
     ratio = np.sort(np.linalg.eigvals(np.linalg.solve(true, found)).real)
     assert ratio[0] > 0.5
@@ -130,7 +130,7 @@ def test_whitening_by_ones_own_records_is_refused(toys):
     for pool, refused in ((Pool.PREDICT, True), (Pool.COLUMN, False)):
         whitening = toy.whitening(seeds(pool, 48))
         statistic = Statistic.of(whitening, whitening.white(columns).T, 48)
-        (records,) = simulated(toy, [{}], Pool.PREDICT, 16)
+        (records,) = simulate(toy, [{}], Pool.PREDICT, 16)
         if refused:
             with pytest.raises(OwnRecordsError, match="another pool"):
                 Prediction.of(statistic, records, toy.measured)

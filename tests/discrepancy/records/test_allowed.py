@@ -7,7 +7,7 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.records.agreements import agreements
-from ema.discrepancy.records.allowed import allowed
+from ema.discrepancy.records.allowed import list_allowed
 from ema.discrepancy.records.facts import channels, sampling
 
 T = np.arange(0.0, 2.0, 1e-3)
@@ -17,7 +17,7 @@ AXIS = {"t": T, "i_q": np.sin(9.0 * T) + 0.01 * RNG.standard_normal(len(T)), "w_
 
 def of(**named: np.ndarray):
     record = Record((Cycle(0, named),))
-    return allowed(record, sampling(record), channels(record), list(agreements(record)))
+    return list_allowed(record, sampling(record), channels(record), list(agreements(record)))
 
 
 def test_a_current_and_a_speed_are_an_axis_and_lack_an_actuators_channels():

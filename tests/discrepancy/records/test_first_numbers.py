@@ -56,7 +56,7 @@ def test_what_does_not_move_or_has_no_torque_shows_nothing():
 
 
 def known(record, **sheet):
-    return {one.key: one for one in begin.axis([record], begin.Sheet(**sheet))}
+    return {one.key: one for one in begin.begin_axis([record], begin.Sheet(**sheet))}
 
 
 def test_each_parameter_is_marked_by_where_it_is_from():
@@ -97,7 +97,7 @@ def test_a_record_without_motion_or_drive_is_refused(without, why):
     cycle = on_paper.cycle()
     channels = {name: x for name, x in cycle.channels.items() if name not in without.split()}
     with pytest.raises(RecordError, match=why):
-        begin.axis([Record((Cycle(0, channels),))], begin.Sheet())
+        begin.begin_axis([Record((Cycle(0, channels),))], begin.Sheet())
 
 
 def turning(p, sign=1.0):

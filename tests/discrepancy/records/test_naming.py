@@ -11,7 +11,7 @@ from ema.cli import cli
 from ema.core.errors import ConfigError, NegativeAnswer, RecordError
 from ema.core.records import read_record
 from ema.discrepancy.axis.balance.of_records import balance
-from ema.discrepancy.axis.balance.telling import told
+from ema.discrepancy.axis.balance.telling import describe
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models import axis_config
 
@@ -197,6 +197,6 @@ def test_a_map_of_torque_over_angle_is_readings_at_rest(tmp_path):
     assert done.exit_code == 0
     plant = axis_config.load(out)
     assert pytest.approx(3.5e-3, rel=0.1) == plant.F_d
-    (term,) = told(balance(AxisPlant(plant, [read_record(path)])), linear=False)["terms"]
+    (term,) = describe(balance(AxisPlant(plant, [read_record(path)])), linear=False)["terms"]
     values = {name: q["value"] for name, q in term["parameters"].items()}
     assert values == pytest.approx({"amplitude": 8e-3, "order": 36.0, "phase": 0.4}, rel=0.02)

@@ -20,7 +20,7 @@ from ema.core.records import Array
 
 from .apart import DIFFERS, by_record
 from .law import BY_RECORD, BY_RECORD_NAME, Law
-from .regression import Plain, Regression, fitted
+from .regression import Plain, Regression, regress
 from .rows import Rows
 
 INEXACT = 0.1  # of a coefficient, that another motion may move it by, since no law has quite the right form
@@ -95,31 +95,29 @@ def _is_of_base(law: Law) -> bool:
 
 def _of_law(found: Rows, plain: Plain, model: Regression, law: Law, n_blocks: int) -> Agreement:
     own = law if law.key.endswith(BY_RECORD) else by_record(law, len(found.motion.records))
-    fit = fitted(found, plain, [own if other.key == law.key else other for other in model.laws])
+    fit = regress(found, plain, [own if other.key == law.key else other for other in model.laws])
     part = fit.part(own)
     n = own.n_columns // len(found.motion.records)
     covariance = fit.covariance()[part, part]
     name = law.name.removesuffix(BY_RECORD_NAME)
-    return _compared(name, own, fit.coefficients[part].reshape(-1, n), covariance, n_blocks, needed=own is law)
+    return _compare(name, own, fit.coefficients[part].reshape(-1, n), covariance, n_blocks, needed=own is law)
 
 
 def _of_base(found: Rows, plain: Plain, model: Regression, n_blocks: int) -> list[Agreement]:
     """Inertia, friction and drag as each record alone has them beside the laws that all share."""
     n, shared = len(found.motion.records), [law for law in model.laws if not _is_of_base(law)]
-    fit = fitted(found, plain, shared, apart=True)
+    fit = regress(found, plain, shared, apart=True)
     covariance, out, keys = fit.covariance(), [], {law.key for law in model.laws}
     nominal = {"inertia": 0.0, "dry_friction": plain.F_d, "viscous_drag": plain.C}
     for k, name in enumerate(own.split(BY_RECORD)[0] for own in fit.base[::n]):
         part = slice(k * n, (k + 1) * n)
         values = fit.coefficients[part, None] + nominal[name]
         needed = name + BY_RECORD in keys
-        out.append(_compared(name, None, values, covariance[part, part], n_blocks, needed=needed))
+        out.append(_compare(name, None, values, covariance[part, part], n_blocks, needed=needed))
     return out
 
 
-def _compared(
-    name: str, law: Law | None, values: Array, covariance: Array, n_blocks: int, *, needed: bool
-) -> Agreement:
+def _compare(name: str, law: Law | None, values: Array, covariance: Array, n_blocks: int, *, needed: bool) -> Agreement:
     """`covariance`: of all values in a row, shape (n_records n_columns,) twice."""
     n_records, n = values.shape
     c, unseen = values.ravel(), np.diag(covariance) == 0.0

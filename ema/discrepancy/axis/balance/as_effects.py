@@ -27,7 +27,7 @@ def effects(b: Balance, term: Term, coefficients: Array | None = None) -> Effect
     return _of_law(b, term.law, c[b.model.part(term.law)])
 
 
-def instead(b: Balance, term: Term) -> Effects:
+def find_alternatives(b: Balance, term: Term) -> Effects:
     """The same of the laws that the balance cannot tell from this one."""
     found: Effects = {}
     for other in term.instead:

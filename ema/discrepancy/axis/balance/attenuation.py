@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .course import Course
-from .integrated import rows
-from .regression import Corrected, Plain, Regression, fitted
+from .integrated import integrate_rows
+from .regression import Corrected, Plain, Regression, regress
 
 if TYPE_CHECKING:
     from ema.discrepancy.axis.measured import Measured
@@ -39,9 +39,9 @@ def attenuation(
     rng = np.random.default_rng(0)
     moved = []
     for _ in range(N_DRAWS if any(not c.static for c in courses) else 0):
-        noisier = rows(plant, [c if c.static else c.disturbed(rng) for c in courses], halves, unsure)
+        noisier = integrate_rows(plant, [c if c.static else c.disturbed(rng) for c in courses], halves, unsure)
         if noisier is not None:
-            again = fitted(noisier, plain, model.laws)
+            again = regress(noisier, plain, model.laws)
             if again.base == model.base:
                 moved.append(again.coefficients - model.coefficients)
     if len(moved) < 2:

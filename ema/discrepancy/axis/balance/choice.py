@@ -12,7 +12,7 @@ from .found import Balance, Term
 from .law import BY_RECORD, BY_RECORD_NAME, Law
 from .links import LINKS
 from .needed import ALARM, Asked, chance, families_held, is_needed
-from .regression import Corrected, Plain, Regression, fitted
+from .regression import Corrected, Plain, Regression, regress
 from .rows import Rows
 
 MOST_LAWS = 8  # a series of lines is one
@@ -21,20 +21,20 @@ SELDOM = 0.05  # share of draws that another law must win to be one that the rec
 N_DRAWS = 400  # of blocks, to see how often a law wins
 
 
-def chosen(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence[Law] = ()) -> Balance:
+def choose_laws(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence[Law] = ()) -> Balance:
     """Forward and backward selection beside the laws that are `given`."""
     n = int(found.whole.sum())
     drive = float(np.var(found.drive[found.whole]))
     asked = Asked.of(drive * n, every)
-    base = fitted(found, plain, given)
+    base = regress(found, plain, given)
     model, declared = base, {law.key for law in given}
     while _n_laws(model) < MOST_LAWS:
-        trials = _trials(found, plain, model, [law for law in every if not _is_full(model, law)])
-        best = _simplest(trials, asked)
+        trials = _try_each(found, plain, model, [law for law in every if not _is_full(model, law)])
+        best = _choose_simplest(trials, asked)
         if best is None or not is_needed(best, model, asked):
             break
-        model = _revised(found, plain, best, every, asked)
-    while (fewer := _exchanged(found, plain, model, every, asked)) is not None:
+        model = _revise(found, plain, best, every, asked)
+    while (fewer := _exchange(found, plain, model, every, asked)) is not None:
         model = fewer
     terms = tuple(_term(found, plain, model, law, every, asked) for law in model.laws if law.key not in declared)
     return Balance(
@@ -55,7 +55,7 @@ def _is_full(model: Regression, law: Law) -> bool:
     return law.family in LINES and sum(own.family == law.family for own in model.laws) >= MOST_LINES
 
 
-def _simplest(trials: Sequence[Regression], asked: Asked) -> Regression | None:
+def _choose_simplest(trials: Sequence[Regression], asked: Asked) -> Regression | None:
     """The trial that leaves least; of two of which one holds the other, the larger only where it needs to be."""
     best = min(trials, key=lambda r: r.loss, default=None)
     if best is None:
@@ -64,7 +64,7 @@ def _simplest(trials: Sequence[Regression], asked: Asked) -> Regression | None:
     return next((r for r in held if not is_needed(best, r, asked)), best)
 
 
-def _trials(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) -> list[Regression]:
+def _try_each(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) -> list[Regression]:
     """The model with one law more: of each family that is not in it the member that fits best."""
     have = {law.key for law in model.laws}
     single = {law.family for law in model.laws if law.family not in LINES}
@@ -74,10 +74,10 @@ def _trials(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) 
     for law in every:
         if law.key not in have and law.family not in single:
             members.setdefault(law.family, []).append(law)
-    return [fitted(found, plain, _with(model, _best(found, model, own))) for own in members.values()]
+    return [regress(found, plain, _add(model, _best(found, model, own))) for own in members.values()]
 
 
-def _with(model: Regression, law: Law) -> list[Law]:
+def _add(model: Regression, law: Law) -> list[Law]:
     """The laws of a model and one more; that one by record takes the place of the same for all."""
     return [*(own for own in model.laws if law.repeats is None or own.key != law.repeats.key), law]
 
@@ -96,28 +96,28 @@ def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
     return members[int(np.argmax(gains))]
 
 
-def _revised(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], asked: Asked) -> Regression:
+def _revise(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], asked: Asked) -> Regression:
     """Without laws that later ones made superfluous, or with another in their place that does clearly better."""
     for law in model.laws[:-1]:
         if law.family in (*LINES, LINKS):
             continue  # lines stand beside each other, and a neighbour is declared
-        without = fitted(found, plain, [own for own in model.laws if own.key != law.key])
+        without = regress(found, plain, [own for own in model.laws if own.key != law.key])
         if not is_needed(model, without, asked):
             model = without
             continue
-        other = _simplest(_trials(found, plain, without, every), asked)
+        other = _choose_simplest(_try_each(found, plain, without, every), asked)
         if other is not None and other.laws[-1].key != law.key and is_needed(other, model, asked):
             model = other
     return model
 
 
-def _exchanged(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], asked: Asked) -> Regression | None:
+def _exchange(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], asked: Asked) -> Regression | None:
     """A model of fewer laws that leaves no more: one law may do what several stood in for."""
     single = [law for law in model.laws if law.family not in (*LINES, LINKS)]
-    for trial in _trials(found, plain, model, every) if len(single) > 1 else ():
+    for trial in _try_each(found, plain, model, every) if len(single) > 1 else ():
         reduced = trial
         for law in single:
-            without = fitted(found, plain, [own for own in reduced.laws if own.key != law.key])
+            without = regress(found, plain, [own for own in reduced.laws if own.key != law.key])
             if not is_needed(reduced, without, asked):
                 reduced = without
         if len(reduced.laws) < len(model.laws) and not is_needed(model, reduced, asked):
@@ -129,13 +129,13 @@ def _exchanged(found: Rows, plain: Plain, model: Regression, every: Sequence[Law
 
 def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequence[Law], asked: Asked) -> Term:
     """How sure a law is beside all that could stand in its place."""
-    without = fitted(found, plain, [own for own in model.laws if own.key != law.key])
-    others = [r for r in _trials(found, plain, without, every) if r.laws[-1].key != law.key]
+    without = regress(found, plain, [own for own in model.laws if own.key != law.key])
+    others = [r for r in _try_each(found, plain, without, every) if r.laws[-1].key != law.key]
     siblings: dict[str, list[Law]] = {}
     for other in every:
         if other.family == law.family and other.name != law.name:
             siblings.setdefault(other.name, []).append(other)
-    same = [fitted(found, plain, _with(without, _best(found, without, own))) for own in siblings.values()]
+    same = [regress(found, plain, _add(without, _best(found, without, own))) for own in siblings.values()]
     rivals: dict[str, Regression] = {}
     for r in [*others, *same]:
         own = r.laws[-1].name.removesuffix(BY_RECORD_NAME)
@@ -174,6 +174,6 @@ def _is_ruled_out(found: Rows, plain: Plain, model: Regression, law: Law, rival:
     Econometrica 49, 1981).
     """
     other = rival.laws[-1]
-    both = fitted(found, plain, [*model.laws, other])
-    beside = fitted(found, plain, [*rival.laws, law])
+    both = regress(found, plain, [*model.laws, other])
+    beside = regress(found, plain, [*rival.laws, law])
     return chance(beside, rival, [law]) < ALARM <= chance(both, model, [other])

@@ -15,7 +15,7 @@ WARMED = 5.0  # [K] of temperature that records must cover
 LOST = tuple(np.geomspace(0.003, 0.06, 8).tolist())  # [1/K]
 
 
-def drifting(m: Motion, torque: str, place: str) -> Iterator[Law]:
+def drift_laws(m: Motion, torque: str, place: str) -> Iterator[Law]:
     """Dry and viscous friction over time, and over temperature."""
     begin, span = float(m.t.min()), float(np.ptp(m.t)) or 1.0
     drag = f"{torque} s/{place}"

@@ -19,7 +19,7 @@ from ema.core.records import Array
 from .course import Course
 from .motion import Motion
 from .rows import Rows
-from .sampled import at_rest, joined, moving
+from .sampled import at_rest, join, smooth_motion
 from .smooth import bumps_at
 from .widths import acceleration, half_widths
 
@@ -31,7 +31,7 @@ FEWEST = 40  # rows from which a regression is worth it
 N_BLOCKS = 64  # the records are cut into about so many
 
 
-def rows(
+def integrate_rows(
     plant: Measured, courses: list[Course], halves: dict[str, float] | None = None, unsure: float = 0.0
 ) -> Rows | None:
     """Rows of all courses; None where there are too few to say anything. `halves`: half widths by record. [s]
@@ -50,7 +50,7 @@ def rows(
     model = plant.model({})
     motions, pieces, matrices, derivatives, offset, block, piece = [], [], [], [], 0, 0, 0
     for c in courses:
-        motion = at_rest(plant, model, c) if c.static else moving(plant, model, c, widths[c.record])
+        motion = at_rest(plant, model, c) if c.static else smooth_motion(plant, model, c, widths[c.record])
         motions.append(motion)
         n = len(c.t)
         if c.static:
@@ -76,13 +76,13 @@ def rows(
     alpha, own, whole, cluster, record, sigma = (np.concatenate(column) for column in zip(*pieces, strict=True))
     if len(alpha) < FEWEST:
         return None
-    join = _stacked(matrices, offset)
+    stacked = _stack(matrices, offset)
     of_record = np.repeat([names.index(c.record) for c in courses], [len(c.t) for c in courses])
-    motion = replace(joined(motions), record=of_record, records=tuple(names))
+    motion = replace(join(motions), record=of_record, records=tuple(names))
     _, own = np.unique(own, return_inverse=True)
     half = float(np.median(list(widths.values()))) if widths else 0.0
-    known, drive, slopes = join @ motion.known, join @ motion.drive, _stacked(derivatives, offset)
-    return Rows(motion, known, drive, alpha, join, slopes, own, whole, cluster, record, sigma, half)
+    known, drive, slopes = stacked @ motion.known, stacked @ motion.drive, _stack(derivatives, offset)
+    return Rows(motion, known, drive, alpha, stacked, slopes, own, whole, cluster, record, sigma, half)
 
 
 def _weak(
@@ -125,7 +125,7 @@ def _means(n: int, every: int) -> csr_array:
     return csr_array((1.0 / count[at], (at, np.arange(n))), shape=(m, n))
 
 
-def _stacked(matrices: list[tuple[csr_array, int, int]], total: int) -> csr_array:
+def _stack(matrices: list[tuple[csr_array, int, int]], total: int) -> csr_array:
     parts = []
     for matrix, offset, _ in matrices:
         m = matrix.tocoo()

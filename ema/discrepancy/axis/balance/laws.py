@@ -13,10 +13,10 @@ import numpy as np
 from ema.core.records import Array
 
 from .along import by_position
-from .drifting import drifting
+from .drifting import drift_laws
 from .law import Acting, Columns, Law, one
 from .links import coupled_friction
-from .memory import remembering
+from .memory import memory_laws
 from .motion import Motion
 from .units import LINEAR, ROTARY, Units
 
@@ -42,9 +42,9 @@ def laws(m: Motion, *, linear: bool) -> Iterator[Law]:
     )
     if moves:
         yield from _by_speed(m, u)
-        yield from drifting(m, u.torque, u.place)
+        yield from drift_laws(m, u.torque, u.place)
         if m.has_position:
-            yield from remembering(m, u.torque, u.place)
+            yield from memory_laws(m, u.torque, u.place)
         if min(float(np.mean(m.drive > 0.0)), float(np.mean(m.drive < 0.0))) > SEEN_BOTH:
             yield _unequal_drive()
     if m.neighbour:

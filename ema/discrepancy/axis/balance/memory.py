@@ -18,7 +18,7 @@ WAYS = tuple(np.geomspace(0.004, 0.5, 12).tolist())  # of the way between two re
 GAP = 5.0  # median samples without a reading after which nothing is known of the bristles
 
 
-def remembering(m: Motion, torque: str, place: str) -> Iterator[Law]:
+def memory_laws(m: Motion, torque: str, place: str) -> Iterator[Law]:
     """A family over the way that friction needs; none where the axis does not turn round."""
     new = np.diff(m.t, prepend=m.t[0] - 1.0)
     begins = (new <= 0.0) | (new > GAP * float(np.median(new))) | m.static

@@ -13,15 +13,15 @@ from ema.models.axis_config import Axis, LinearAxis
 from .agreement import INEXACT, agreements
 from .apart import apart
 from .attenuation import attenuation
-from .choice import chosen
+from .choice import choose_laws
 from .course import Course, courses
 from .found import Balance
-from .integrated import rows
+from .integrated import integrate_rows
 from .law import Acting, Law
 from .laws import laws
 from .links import links
-from .own_zeros import with_zeros
-from .regression import Plain, Regression, fitted
+from .own_zeros import add_zeros
+from .regression import Plain, Regression, regress
 from .rows import Rows
 from .units import LINEAR, ROTARY, of_base
 from .widths import LONGEST, STILL, half_widths
@@ -46,8 +46,8 @@ def balance(plant: Measured) -> Balance | None:
     """The balance of all records; None where no stretch of motion is long enough."""
     p = plant.plant
     plain = plain_of(p)
-    recorded = with_zeros(plant, courses(plant))
-    found = rows(plant, recorded)
+    recorded = add_zeros(plant, courses(plant))
+    found = integrate_rows(plant, recorded)
     if found is None:
         return None
     linear = isinstance(p, LinearAxis)
@@ -56,23 +56,23 @@ def balance(plant: Measured) -> Balance | None:
     size = float(np.sqrt(np.mean(found.drive**2)))
     answer, widths, unsure = None, None, 0.0
     for _ in range(N_WIDTHS):  # how wide test functions must be depends on what stands beside the acceleration
-        first = answer.model if answer is not None else fitted(found, plain, [])
+        first = answer.model if answer is not None else regress(found, plain, [])
         wider = half_widths(recorded, _heaviest(first, p.inertia), size)
         if widths is not None and all(wider[name] <= widths[name] for name in wider):
             break
         widths = wider if widths is None else {name: max(wider[name], widths[name]) for name in wider}
         unsure = unsure_share(first, plain, size)
-        found = rows(plant, recorded, widths, unsure) or found
-        answer = chosen(found, plain, shown_by(found, list(every_law(found, linear=linear))), given(found))
+        found = integrate_rows(plant, recorded, widths, unsure) or found
+        answer = choose_laws(found, plain, shown_by(found, list(every_law(found, linear=linear))), given(found))
     assert answer is not None
     assert widths is not None
     for _ in range(N_WIDER):
         wide = {name: 2.0 * half for name, half in widths.items()}
-        slower = rows(plant, recorded, wide, unsure)
+        slower = integrate_rows(plant, recorded, wide, unsure)
         if slower is None or _has_no_room(recorded, wide) or not _is_moved(answer.model, slower, plain):
             break
         found, widths = slower, wide
-        answer = chosen(found, plain, shown_by(found, list(every_law(found, linear=linear))), given(found))
+        answer = choose_laws(found, plain, shown_by(found, list(every_law(found, linear=linear))), given(found))
     return replace(
         answer,
         corrected=attenuation(plant, recorded, widths, plain, answer.model, unsure),
@@ -93,7 +93,7 @@ def _is_moved(model: Regression, slower: Rows, plain: Plain) -> bool:
     """
     if "inertia" not in model.base:
         return False
-    other = fitted(slower, plain, model.laws)
+    other = regress(slower, plain, model.laws)
     if other.base != model.base:
         return False
     k = model.base.index("inertia")

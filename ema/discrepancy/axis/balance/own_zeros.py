@@ -14,25 +14,25 @@ from ema.discrepancy.axis.overlap import between
 
 from .apart import by_record
 from .course import Course
-from .integrated import rows
+from .integrated import integrate_rows
 from .laws import laws
-from .regression import Plain, fitted
+from .regression import Plain, regress
 
 if TYPE_CHECKING:
     from ema.discrepancy.axis.measured import Measured, Zero
 
 
-def refined(plant: Measured, recorded: Sequence[Course], plain: Plain) -> dict[str, Zero]:
+def refine_zeros(plant: Measured, recorded: Sequence[Course], plain: Plain) -> dict[str, Zero]:
     """The zeros of the plant's records by the lines of the balance, where a zero was found to be off."""
     moved = {name: zero.orders for name, zero in plant.zeros.items() if zero.angle}
-    raw = rows(plant, list(recorded)) if moved else None
+    raw = integrate_rows(plant, list(recorded)) if moved else None
     if raw is None:
         return plant.zeros
     names = raw.motion.records
     orders = sorted({n for own in moved.values() for n in own})
     keys = {f"line {n:.5g}": n for n in orders}
     lines = [by_record(law, len(names)) for law in laws(raw.motion, linear=False) if law.key in keys]
-    fit = fitted(raw, plain, lines, apart=True)
+    fit = regress(raw, plain, lines, apart=True)
     parts = [fit.coefficients[fit.part(law)].reshape(-1, 2) for law in lines]
     seen = [keys[law.repeats.key] for law in lines if law.repeats is not None]
     z = {
@@ -46,7 +46,7 @@ def refined(plant: Measured, recorded: Sequence[Course], plain: Plain) -> dict[s
     return {**plant.zeros, **{name: zero for name, zero in found.items() if zero.angle is not None}}
 
 
-def with_zeros(plant: Measured, recorded: Sequence[Course]) -> list[Course]:
+def add_zeros(plant: Measured, recorded: Sequence[Course]) -> list[Course]:
     """The courses with what is to be added to their angles."""
     angles = {name: zero.angle or 0.0 for name, zero in plant.zeros.items()}
     return [replace(c, zero=angles.get(c.record, 0.0)) for c in recorded]

@@ -112,7 +112,7 @@ class Regression:
         return out
 
 
-def fitted(rows: Rows, plain: Plain, laws: Sequence[Law], *, apart: bool = False) -> Regression:
+def regress(rows: Rows, plain: Plain, laws: Sequence[Law], *, apart: bool = False) -> Regression:
     """Fit the base and `laws`; the base `apart`: one column for each record."""
     base, columns = _base(rows)
     if apart:
@@ -124,12 +124,12 @@ def fitted(rows: Rows, plain: Plain, laws: Sequence[Law], *, apart: bool = False
     acting = Acting(m.drive, m.drive, m.drive)
     waits = any(law.needs_acting for law in laws)
     if waits:
-        acting = fitted(rows, plain, [law for law in laws if not law.needs_acting]).acting
+        acting = regress(rows, plain, [law for law in laws if not law.needs_acting]).acting
     for _ in range(N_ROUNDS if waits else 1):
         own = [law.columns(m, acting) for law in laws]
         design = np.column_stack([columns, *(column for law in laws for column in rows.of(law, acting))])
-        coefficients = _solved(design, rows.y)
-        acting = _acting(rows, plain, base, laws, own, coefficients)
+        coefficients = _solve(design, rows.y)
+        acting = _split_drive(rows, plain, base, laws, own, coefficients)
     left = rows.y - design @ coefficients
     return Regression(
         rows, tuple(laws), base, design, coefficients, left, _held_out(rows, design), acting
@@ -156,7 +156,7 @@ def _base(rows: Rows) -> tuple[tuple[str, ...], Array]:
     return tuple(kept), np.column_stack(list(kept.values()))
 
 
-def _solved(design: Array, y: Array) -> Array:
+def _solve(design: Array, y: Array) -> Array:
     size = np.linalg.norm(design, axis=0)
     size = np.where(size > 0.0, size, 1.0)  # of what no row shows the coefficient is 0, and no digit of it over nothing
     A = design / size
@@ -180,7 +180,7 @@ def _held_out(rows: Rows, design: Array) -> Array:
     return out
 
 
-def _acting(
+def _split_drive(
     rows: Rows, plain: Plain, base: tuple[str, ...], laws: Sequence[Law], own: Sequence[tuple[Array, ...]], c: Array
 ) -> Acting:
     """The drive's torque that this model needs, and what of it is no friction. [N m or N]"""

@@ -23,7 +23,7 @@ CREEP = 0.02  # of the rms speed: below, friction at rest and in sliding mix
 SEEN = 3.0  # deviations of the smoothed speed that show a direction
 
 
-def moving(plant: Measured, model: axis.Model, c: Course, half: float) -> Motion:
+def smooth_motion(plant: Measured, model: axis.Model, c: Course, half: float) -> Motion:
     """Motion along a course, smoothed over a half width. [s]"""
     n_half = max(3, round(half / c.period))
     if c.position is not None:
@@ -66,7 +66,7 @@ def at_rest(plant: Measured, model: axis.Model, c: Course) -> Motion:
     )  # fmt: skip
 
 
-def joined(motions: Sequence[Motion]) -> Motion:
+def join(motions: Sequence[Motion]) -> Motion:
     """The samples of several motions in one row."""
 
     def of(name: str) -> Array:

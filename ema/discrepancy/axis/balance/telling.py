@@ -23,9 +23,9 @@ MADE_BY = {  # what makes a fitted value implausible
 }
 
 
-def told(b: Balance, *, linear: bool) -> dict[str, Any]:
+def describe(b: Balance, *, linear: bool) -> dict[str, Any]:
     """The balance for findings.json."""
-    samples = drawn(b)
+    samples = draw(b)
     unit = "N" if linear else "N m"
     return {
         "drive_rms": _short(b.drive**0.5),
@@ -50,7 +50,7 @@ def _short(x: float) -> float:
     return float(f"{x:.5g}")
 
 
-def drawn(b: Balance) -> Array:
+def draw(b: Balance) -> Array:
     """Coefficients drawn from their uncertainty, shape (N_DRAWS, n)."""
     rng = np.random.default_rng(0)
     return rng.multivariate_normal(b.corrected.coefficients, b.corrected.covariance, N_DRAWS, method="eigh")
