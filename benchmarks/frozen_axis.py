@@ -59,6 +59,7 @@ def beside_truth(t: strata_axis.Trial, said: dict[str, Any]) -> dict[str, Any]:
         "outcome": result, "verdict": said["verdict"], "nats": max(missed, default=None),
         "named": [[e["name"], *e["indistinguishable_from"]] for e in effects],
         "confidence": [e["confidence"] for e in effects],
+        "posterior": said.get("posterior", [])[:5],
         "z": {name: (quantities[name]["value"] - x) / sd[name] for name, x in true.items() if sd[name] > 0.0},
         **said["gain"]["heldout"], "said": said["structure"].get("sentences", []),
     }  # fmt: skip

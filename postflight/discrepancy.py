@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -83,7 +83,7 @@ def discrepancy(
     else:
         for sentence in findings.sentences():
             click.echo(sentence)
-        for line in _leading(findings.posterior):
+        for line in _leading(findings):
             click.echo(line)
         if findings.next_recording:
             click.echo(f"{findings.next_recording['sentence']}.")
@@ -142,9 +142,10 @@ def _examined(
     return findings
 
 
-def _leading(posterior: Sequence[dict[str, Any]]) -> list[str]:
-    """The likeliest sets in one line, where there is more than one that is not ruled out."""
-    told = [f"{' + '.join(s['effects']) or 'faults alone'} {s['probability']:.2f}" for s in posterior[:N_LEADING]]
+def _leading(findings: Findings) -> list[str]:
+    """The likeliest sets in one line."""
+    leading = findings.posterior[:N_LEADING]
+    told = [f"{' + '.join(s['effects']) or findings.gain.no_cause} {s['probability']:.2f}" for s in leading]
     return [f"Probabilities of the sets fitted: {', '.join(told)}."] if told else []
 
 

@@ -13,8 +13,9 @@ from .outcome import Gain, Outcome
 from .plant import Plant
 from .progress import Progress
 from .rounds import Reread, State, judge_model, leave_out, never, revise, select, try_library_alone
-from .selection import FORM, above_noise, compare, find_alike, fit_base, is_nameless
+from .selection import FORM, above_noise, compare, fit_base, is_nameless
 from .trust import describe_effects, drop_unlikely
+from .weighing import Weighed
 
 MIMICKED = 0.02  # of an effect's mark in power, where less is left of it beside the base parameters it cannot be seen
 
@@ -31,7 +32,7 @@ def examine(plant: Plant, progress: Progress | None = None, reread: Reread | Non
     select(plant, state, progress)
     revise(plant, state, progress)
     state = try_library_alone(plant, state, progress)
-    trust = drop_unlikely(plant, state, progress)
+    trust, weighed = drop_unlikely(plant, state, progress)
     plain = state.plain
     verdict = judge_model(plant, plain)
     left = _without_small_terms(plant, state)
@@ -58,13 +59,14 @@ def examine(plant: Plant, progress: Progress | None = None, reread: Reread | Non
         verdict=outcome,
         because=verdict.because,
         p_value=verdict.p_value,
-        effects=describe_effects(plant, state, trust, final.point, final.draw),
+        effects=describe_effects(plant, state, trust, weighed, final.point, final.draw),
         structure=plant.describe_structure(terms, final.point) if terms or outcome == "unexplained" else {},
         train=training_gain(plant, plain, state.model),
         heldout=Gain(folds.err_before, folds.err_after, folds.noise_floor),
         folds=folds,
         left=left,
-        lost=[*state.unlikely, *_lost(state)],
+        posterior=weighed.described() if state.rounds or state.unlikely else [],
+        lost=[*state.unlikely, *_lost(state, weighed)],
         base=names,
         k_before=[float(before.point[n]) for n in names],
         k_after=[float(final.point[n]) for n in names],
@@ -78,12 +80,12 @@ def examine(plant: Plant, progress: Progress | None = None, reread: Reread | Non
     )
 
 
-def _lost(state: State) -> list[dict[str, Any]]:
+def _lost(state: State, weighed: Weighed) -> list[dict[str, Any]]:
     """Effects of the library that were tried in the place of one that is named, gain by more than chance, and lost."""
     rows: dict[str, dict[str, Any]] = {}
     for own, (trials, before) in zip(state.model.accepted, state.rounds, strict=True):
         scale = min(t.scale for t in trials.values())
-        told = {own.key, *find_alike(trials, own.key, before), *(c.key for c in state.model.accepted)}
+        told = {*weighed.instead(own.key), *(c.key for c in state.model.accepted)}
         for key, trial in trials.items():
             if key in told or is_nameless(key, trial) or not compare(trial, before, scale).is_significant:
                 continue

@@ -91,6 +91,11 @@ class Gain:
     residual: Folds | None = None  # the same of the residual weighed by its noise, in its deviations
 
     @property
+    def no_cause(self) -> str:
+        """What explains a record without any effect: faults, of an actuator."""
+        return "none of the library" if self.k_names else "faults alone"
+
+    @property
     def rest(self) -> float:
         """What is left of held-out parts over what noise makes of it, of error or residual whichever is more."""
         error = self.heldout_after / max(self.noise_floor, 1e-300)

@@ -53,6 +53,8 @@ class Outcome:
         Residual over noise where the final model leaves more than noise, 0 where it does not.
     lost : list of dict
         Effects that foretell held-out parts, but worse than the one that is in their place: as in `Findings.rejected`.
+    posterior : list of dict
+        Sets of effects with their probabilities: as in `Findings.posterior`.
     point : Point
         All fitted values of the final model.
     """
@@ -77,3 +79,4 @@ class Outcome:
     folds: Folds | None = None
     left: Left | None = None
     lost: list[dict[str, Any]] = field(default_factory=list)
+    posterior: list[dict[str, Any]] = field(default_factory=list)

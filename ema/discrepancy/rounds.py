@@ -157,8 +157,9 @@ def revise(plant: Plant, state: State, progress: Progress) -> None:
             state.model = reduced
             del state.rounds[k]
             continue
-        last = k == len(state.model.accepted) - 1
-        if own.is_structure or last:
+        trials = state.rounds[k][0]
+        is_current = own.key in trials and trials[own.key] is state.model
+        if own.is_structure or is_current:
             state.rounds[k] = (state.rounds[k][0], reduced)
             k += 1
             continue

@@ -81,14 +81,17 @@ class Comparison:
 def compare(one: Tried, other: Tried, scale: float | None = None) -> Comparison:
     """Gain in held-out log-likelihood of `one` over `other`, with its standard error over parts of the records."""
     scale = scale if scale is not None else min(one.scale, other.scale)
-    parts = max(1, -(-MIN_PARTS // max(len(one.held_out), 1)))
-    gains = []
-    for a, b in zip(log_likelihood(one.held_out, scale), log_likelihood(other.held_out, scale), strict=True):
-        gains += [float(part.sum()) for part in np.array_split(a - b, parts)]
-    d = np.array(gains)
+    d = log_scores(one, scale) - log_scores(other, scale)
     error = float(np.std(d, ddof=1) * np.sqrt(len(d))) if len(d) > 1 else np.inf
     is_local = bool((d > ODDS).sum() >= FEW_PARTS and -d[d < 0.0].sum() < MAX_LOSS * d[d > 0.0].sum())
     return Comparison(float(d.sum()), error, scale, is_local)
+
+
+def log_scores(tried: Tried, scale: float) -> Array:
+    """Held-out log-likelihood of each part of the records, shape (n_parts,), up to a constant. [nats]"""
+    n = max(1, -(-MIN_PARTS // max(len(tried.held_out), 1)))
+    blocks = log_likelihood(tried.held_out, scale)
+    return np.array([float(part.sum()) for block in blocks for part in np.array_split(block, n)])
 
 
 def list_folds(plant: Plant) -> list[tuple[list[int], list[int]]]:
@@ -207,22 +210,6 @@ def choose(trials: dict[str, Tried], model: Tried) -> str | None:
     if is_worth_it(trials[one], model) or not is_worth_it(trials[other], model):
         return one
     return other
-
-
-def find_alike(trials: dict[str, Tried], best: str, model: Tried) -> list[str]:
-    """Candidates the data cannot tell from the best one."""
-    top = trials[best]
-    scale = min(t.scale for t in trials.values())
-    whole = compare(top, model, scale).gain
-    out = []
-    for key, trial in trials.items():
-        if key == best:
-            continue
-        lead = compare(top, trial, scale)
-        unclear = scale > NEARLY_NOISE and lead.gain < SAME_SHARE * whole
-        if (not lead.is_clear or unclear) and compare(trial, model, scale).is_significant:
-            out.append(key)
-    return out
 
 
 def above_noise(tried: Tried) -> float:

@@ -12,28 +12,27 @@ from .grade import NAMED
 from .plant import Array, Candidate, Free, Plant
 from .progress import Progress
 from .rounds import State, is_explained, judge_model, leave_out
-from .selection import FORM, Tried, above_noise, compare, find_alike, find_best, is_nameless
+from .selection import FORM, Tried, above_noise, compare
+from .weighing import Weighed, weigh_sets
 
 
-def drop_unlikely(plant: Plant, state: State, progress: Progress) -> dict[str, float]:
+def drop_unlikely(plant: Plant, state: State, progress: Progress) -> tuple[dict[str, float], Weighed]:
     """Leave out effects that are no causes: what they explain is a rest without a name. The trust in those that stay.
 
     These are the unlikeliest together with all that the data cannot tell from them, and, where much stays unexplained,
     those that lean on the bounds of what is credible.
     """
     while True:
-        trust = _trust(plant, state)
+        trust, weighed = _trust(plant, state), weigh_sets(state.plain, state.model, state.rounds)
         explained = is_explained(plant, state.plain, state.model)
         odds = {}
-        for k, (c, (trials, before)) in enumerate(zip(state.model.accepted, state.rounds, strict=True)):
+        for k, c in enumerate(state.model.accepted):
             if not c.is_structure:
-                weights = _weights(trials, before)
-                told = {c.key, *(key for key in find_alike(trials, c.key, before) if key in weights)}
                 no_cause = not explained and leans_in_a_fold(state.model, k)
-                odds[c.key] = 0.0 if no_cause else trust[c.key] * sum(weights[key] for key in told)
+                odds[c.key] = 0.0 if no_cause else trust[c.key] * sum(weighed.instead(c.key).values())
         worst = min(odds, key=lambda key: odds[key], default=None)
         if worst is None or odds[worst] >= NAMED:
-            return trust
+            return trust, weighed
         progress(f"without {worst}, which is unlikely")
         k = [c.key for c in state.model.accepted].index(worst)
         without = leave_out(plant, state.model, {k})
@@ -43,26 +42,21 @@ def drop_unlikely(plant: Plant, state: State, progress: Progress) -> dict[str, f
 
 
 def describe_effects(
-    plant: Plant, state: State, trust: dict[str, float], point: Any, draw: Any
+    plant: Plant, state: State, trust: dict[str, float], weighed: Weighed, point: Any, draw: Any
 ) -> list[dict[str, Any]]:
     """The model's effects for findings.json, each with what the data cannot tell from it."""
-    accepted = state.model.accepted
-    named = [c for c in accepted if not c.is_structure]
-    if not named:
-        return []
-    rounds = dict(zip((c.key for c in accepted), state.rounds, strict=True))
+    named = [c for c in state.model.accepted if not c.is_structure]
     out = []
-    for entry in plant.describe(named, point, draw):
+    for entry in plant.describe(named, point, draw) if named else ():
         key = entry.pop("key")
-        trials, before = rounds[key]
-        others = {o for o in find_alike(trials, key, before) if not is_nameless(o, trials[o])}
-        others |= set(entry.pop("also", ()))
-        confidence = _weights(trials, before)[key] * trust[key] / (1 + entry.pop("n_equal", 0))
+        instead = {name: trust[key] * p for name, p in weighed.instead(key).items()}
+        confidence = instead[key] / (1 + entry.pop("n_equal", 0))
         out.append(
             {
                 "name": entry.pop("name"),
                 "confidence": round(confidence, 4),
-                "indistinguishable_from": sorted(others),
+                "of_others": round(sum(instead.values()) - confidence, 4),
+                "indistinguishable_from": sorted({*instead, *entry.pop("also", ())} - {key}),
                 **entry,
             }
         )
@@ -133,16 +127,3 @@ def _looks_like(one: Sequence[Array], other: Sequence[Array]) -> float:
     """Share in power of what one effect does that another would make, were its law of another strength by block."""
     both = sum(float(a @ b) ** 2 / float(b @ b) for a, b in zip(one, other, strict=True) if b.any())
     return both / max(sum(float(a @ a) for a in one), 1e-300)
-
-
-def _weights(trials: dict[str, Tried], before: Tried) -> dict[str, float]:
-    """Share of each effect in the likelihood of held-out data; gains count no more than their error allows."""
-    trials = {key: t for key, t in trials.items() if not is_nameless(key, t)}
-    scale = min(t.scale for t in trials.values())
-    best = find_best(trials, before)
-    logs = {}
-    for key, trial in trials.items():
-        lead = compare(trials[best], trial, scale)
-        logs[key] = -lead.gain / max(1.0, lead.error / 5.0)
-    total = sum(np.exp(v) for v in logs.values())
-    return {key: float(np.exp(v) / total) for key, v in logs.items()}

@@ -74,7 +74,7 @@ def named(small, acting):
     both = plant.tried("large", "small")
     rounds = [({"large": both}, plant.tried("small")), ({"small": both}, plant.tried("large"))]
     state = State(plant.tried(), both, rounds, [])
-    trust = drop_unlikely(plant, state, Progress())
+    trust, _ = drop_unlikely(plant, state, Progress())
     return trust, [row["name"] for row in state.unlikely]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from ema.core.names import FAULTS
 from ema.core.records import Array
 from ema.discrepancy.engine.hypothesis import Block, Cause, Parameter, Point
+from ema.discrepancy.engine.posterior import PRIOR
 from ema.effects import registry
 
 from .candidates import Candidate
@@ -17,7 +18,6 @@ from .plant import EmaPlant
 
 K_USUAL = 0.05  # of a fault that is worth an alarm
 K_MOST = 0.6  # a larger fault is no wear any more
-PRIOR = 0.02  # probability that one given effect is there; some thirty make one cause likely in every other record
 
 
 class ActuatorProblem:

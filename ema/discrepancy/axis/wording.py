@@ -86,6 +86,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         told_by_runs = [_effect(e) for e in outcome.effects]
         found, by_balance = merge(plant, told_by_runs, outcome.verdict, outcome.point, follows=follows)
         verdict = grade(outcome.left, named=True) if by_balance is not None and outcome.left else outcome.verdict
+    by_runs = rules is None and by_balance is None
     found = add_external(plant, found)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
     notes += [f"implausible: {text}" for text in find_implausible(plant, outcome)]
@@ -101,6 +102,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         _fitted(plant, outcome) if by_balance is None else _by_balance(plant, by_balance),
         rest=outcome.rest,
         rejected=_rejected(plant, outcome, {name for e in found for name in (e.name, *e.indistinguishable_from)}),
+        posterior=outcome.posterior if by_runs else [],
         balance=said,
     )
 
@@ -160,7 +162,16 @@ def _effect(e: dict[str, Any]) -> shared.FoundEffect:
     parameters = {name: shared.Quantity(**q) for name, q in e["parameters"].items()}
     others = tuple(e["indistinguishable_from"])
     place = registry()[e["name"]].place if e["name"] in registry() else "plant"
-    return shared.FoundEffect(e["name"], e["confidence"], others, parameters, e["sentence"], e["separated_by"], place)
+    return shared.FoundEffect(
+        e["name"],
+        e["confidence"],
+        others,
+        parameters,
+        e["sentence"],
+        e["separated_by"],
+        place,
+        of_others=e["of_others"],
+    )
 
 
 def _kinds(plant: AxisPlant) -> list[str]:

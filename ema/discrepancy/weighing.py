@@ -1,0 +1,81 @@
+"""Sets of effects that the rounds have fitted, on one scale: what held-out parts of the records say, and a prior."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .engine.posterior import PRIOR, Entry, p_cause, posterior
+from .selection import NEARLY_NOISE, SAME_SHARE, Tried, is_nameless, log_scores
+
+IN_SET = 0.05  # share of what is sure of a set, below which a member is none: the others are a set of 95 %
+TOLD = 1e-3  # probability from which a set is told
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Sets of effects by their probability, and the trials in the place of each effect of the model.
+
+    `effects` are the names in the library of what the sets hold; terms without a name are not among them.
+    """
+
+    entries: list[Entry]
+    in_place: dict[str, dict[str, Tried]]
+    effects: dict[str, str]
+
+    def instead(self, key: str) -> dict[str, float]:
+        """What may stand in the place of an effect of the model, with the probability that it does; itself first."""
+        own = p_cause(self.entries, key)
+        p = {e.causes: e.probability for e in self.entries}
+        trials = {other: p.get(_names(t), 0.0) for other, t in self.in_place[key].items() if other != key}
+        whole = own + sum(trials.values())
+        return {key: own, **{other: q for other, q in trials.items() if q > 0.0 and q >= IN_SET * whole}}
+
+    def described(self) -> list[dict[str, Any]]:
+        """For findings.json (`Findings.posterior`)."""
+        top = max(e.log_evidence for e in self.entries)
+        return [
+            {
+                "effects": [self.effects[key] for key in e.causes if key in self.effects],
+                "faults": [],
+                "probability": e.probability,
+                "nats_behind": top - e.log_evidence,
+                "nats_error": e.error,
+            }
+            for e in self.entries
+            if e.probability >= TOLD
+        ]
+
+
+def weigh_sets(plain: Tried, model: Tried, rounds: Sequence[tuple[dict[str, Tried], Tried]]) -> Weighed:
+    """Every set of effects of the library that was fitted, beside the terms without a name that the model has.
+
+    Where the likeliest leaves more than noise, the form of its law is another, and so may be that of the others: each
+    may be off by a share of what there was to explain. `rounds` hold, for each effect of `model`, the trials in its
+    place and the model without it.
+    """
+    fitted = [plain]
+    for trials, before in rounds:
+        fitted += [*trials.values(), before]
+    terms = {c.key for c in model.accepted if c.is_structure}
+    sets = {_names(t): t for t in (*fitted, model) if {c.key for c in t.accepted if c.is_structure} <= terms}
+    scale = min(t.scale for t in sets.values())
+    parts = {names: log_scores(t, scale) for names, t in sets.items()}
+    score = {names: float(of.sum()) for names, of in parts.items()}
+    gained = max(score.values()) - score[_names(plain)]
+    form = 0.5 * SAME_SHARE * gained if scale > NEARLY_NOISE else 0.0
+    prior = float(np.log(PRIOR) - np.log1p(-PRIOR))
+    evidence = {names: z + prior * len(names) for names, z in score.items()}
+    in_place = {
+        own.key: {key: t for key, t in trials.items() if not is_nameless(key, t)}
+        for own, (trials, _) in zip(model.accepted, rounds, strict=True)
+    }
+    effects = {c.key: c.effect for t in sets.values() for c in t.accepted if not c.is_structure}
+    return Weighed(posterior(evidence, form, parts), in_place, effects)
+
+
+def _names(tried: Tried) -> tuple[str, ...]:
+    return tuple(sorted(c.key for c in tried.accepted))
