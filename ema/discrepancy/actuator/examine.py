@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ema.core.errors import RecordError
-from ema.core.records import Record
+from ema.core.records import Array, Record
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.findings import Findings
 from ema.discrepancy.grade import NAMED
@@ -29,7 +29,8 @@ from .growing import describe, find_faults_beside, find_growing_faults, widen
 from .measured import Measured
 from .model import Model
 from .next_recording import next_recording
-from .noise import Noise
+from .noise import Noise, Verdict
+from .paths import Path as Way
 from .paths import begin_with_faults, begin_with_faults_alone, choose_path, go_on, resume, retry_with_steady_faults
 from .plant import EmaPlant
 from .play import add_user_friction, take_hold_of_user
@@ -74,6 +75,15 @@ def is_named(outcome: Outcome, model: Model, effect: str, *rivals: str) -> bool:
     return sum(p.values()) >= NAMED and of_effects >= IN_SET * sum(p.values())
 
 
+@dataclass(frozen=True)
+class _Answer:
+    """A model with its verdict and, for each of its effects, what does as well in its place."""
+
+    model: Model
+    verdict: Verdict
+    alike: list[tuple[str, ...]]
+
+
 def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progress | None = None) -> Examination:
     """What the simulation of `plant` gets wrong about `data`."""
     if data.n_cycles < MIN_CYCLES:
@@ -82,16 +92,31 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
         )
     say = say or Progress()
     data, left_out = thin(data)
-    stated = plant
+    as_stated = plant
     train, heldout = split(data)
     plant, conditions = take_recorded_conditions(plant, data.signals)
-    if left_out:
-        conditions.append(left_out)
     gear = find_resonance(plant, data)
     plant, data = take_hold_of_user(plant, start_swinging(data, gear))
     ema = EmaPlant(plant, data, n_threads, gear)
     say("switching noise")
-    search = Search(ema, Noise(ema, {}), train, heldout, say)
+    search, path, of_each = _find_path(Search(ema, Noise(ema, {}), train, heldout, say))
+    outcome, answer, notes = _take_likeliest(search, path, _prefer_fewer_causes(search, path))
+    findings, after = _write(search, path, answer, outcome, of_each)
+    findings.notes.extend([*conditions, *([left_out] if left_out else []), *notes])
+    if findings.verdict == "adequate":
+        findings.notes.extend(path.as_well)
+    if of_each is not None:
+        findings.notes.append(describe(search.plant.data.faults, after.fit.point))
+    findings.notes.extend(_describe_conditions(search, path))
+    findings = add_user_friction(as_stated, plant, findings)
+    return Examination(findings, search, path.before, after, path.verdict_before, answer.verdict)
+
+
+def _find_path(search: Search) -> tuple[Search, Way, Array | None]:
+    """The search and its way to what explains the cycles, and faults of each cycle (n_cycles, 6) where these grow.
+
+    Faults of each cycle and what all cycles leave alike are found in turn.
+    """
     paths = begin_with_faults_alone(search, {})
     of_each = None if paths[0].verdict.is_noise else find_growing_faults(search, paths[0].before)
     steady = search
@@ -112,7 +137,11 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
         search = begin_with_faults(search, of_each, after.fit.point)
         path = go_on(search, replace(path, after=after, verdict=v))
     resume(search, path)
-    ema = search.plant
+    return search, path, of_each
+
+
+def _prefer_fewer_causes(search: Search, path: Way) -> _Answer:
+    """What a path found at its minimum, with as few faults and effects as do as well."""
     before, alike = path.before, path.alike
     after, v = settled, _ = settle_at_minimum(search, path.after, path.verdict)
     if not path.verdict_before.is_noise:
@@ -122,38 +151,53 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
         after, v = settle_at_minimum(search, after, v)
     after, v = drop_constant_parts(search, after, v)
     after, v = take_resolver_zero(search, after, v, alike)
-    sets = [(name, *rivals) for name, rivals in zip(after.names, alike, strict=True)]
-    outcome, models = weigh_sets(search, before, after)
-    unlikely = [names[0] for names in sets if not is_named(outcome, after, *names)]
+    return _Answer(after, v, alike)
+
+
+def _take_likeliest(search: Search, path: Way, found: _Answer) -> tuple[Outcome, _Answer, list[str]]:
+    """All sets weighed; the likeliest where what was found has an effect less likely than not; and notes."""
+    sets = [(name, *rivals) for name, rivals in zip(found.model.names, found.alike, strict=True)]
+    outcome, models = weigh_sets(search, path.before, found.model)
+    unlikely = [names[0] for names in sets if not is_named(outcome, found.model, *names)]
+    notes = []
     if unlikely and (not models[0].effects or is_credible(models[0])):
-        say(f"{' + '.join(models[0].names) or 'faults only'} instead of {' + '.join(after.names)}")
-        of = dict(zip(after.names, alike, strict=True))
-        after, alike = models[0], [of.get(name, ()) for name in models[0].names]
-        v = search.verdict(after) if after.effects else path.verdict_before
+        best = models[0]
+        search.say(f"{' + '.join(best.names) or 'faults only'} instead of {' + '.join(found.model.names)}")
+        of = dict(zip(found.model.names, found.alike, strict=True))
+        v = search.verdict(best) if best.effects else path.verdict_before
+        found = _Answer(best, v, [of.get(name, ()) for name in best.names])
     elif unlikely:
-        after, v, alike = before, path.verdict_before, []
-        conditions.append(f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named")
-    alike = [keep_alike(search, after, j, rivals) for j, rivals in enumerate(alike)]
+        notes = [f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named"]
+        found = _Answer(path.before, path.verdict_before, [])
+    alike = [keep_alike(search, found.model, j, rivals) for j, rivals in enumerate(found.alike)]
+    return outcome, replace(found, alike=alike), notes
+
+
+def _write(
+    search: Search, path: Way, answer: _Answer, outcome: Outcome, of_each: Array | None
+) -> tuple[Findings, Model]:
+    """Findings, and the model they are of."""
+    before, after, alike = path.before, answer.model, answer.alike
     if of_each is not None and after.effects:
         after = widen(search, after)
-    findings = write_findings(search, before, after, v, alike, outcome)
+    findings = write_findings(search, before, after, answer.verdict, alike, outcome)
     findings = replace(findings, next_recording=next_recording(search, after, alike, findings.posterior))
-    if findings.verdict == "adequate":
-        conditions.extend(path.as_well)
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
         findings, after = try_as_function(search, findings, before, after)
-    if of_each is not None:
-        conditions.append(describe(ema.data.faults, after.fit.point))
+    return findings, after
+
+
+def _describe_conditions(search: Search, path: Way) -> list[str]:
+    """What was read from the record and is no flaw of the actuator, in words."""
+    ema, notes = search.plant, []
     if ema.late:
         side, samples = "late" if ema.late > 0 else "early", "sample" if abs(ema.late) == 1 else "samples"
-        conditions.append(f"the recorded command is {abs(ema.late)} {samples} {side} against the other channels")
-    if data.zero:
-        conditions.append(f"θ_m/GR and θ_u are {data.zero:.2g} rad apart in the middle of the play")
+        notes.append(f"the recorded command is {abs(ema.late)} {samples} {side} against the other channels")
+    if ema.data.zero:
+        notes.append(f"θ_m/GR and θ_u are {ema.data.zero:.2g} rad apart in the middle of the play")
     if path.step:
-        conditions.append(f"the comparators of the record switch as if evaluated every {1e6 * path.step:g} µs")
-    findings.notes.extend(conditions)
-    findings = add_user_friction(stated, plant, findings)
-    return Examination(findings, search, before, after, path.verdict_before, v)
+        notes.append(f"the comparators of the record switch as if evaluated every {1e6 * path.step:g} µs")
+    return notes
 
 
 def discrepancy(
