@@ -26,7 +26,6 @@ from .plant import AxisPlant
 LATE = {"straight": 0.0, "held": 0.5, "held before": -0.5}  # samples by which the motion is later than straight
 DELAYS = {"position_delay.time": {"theta_m", "q"}, "speed_delay.time": {"w_m", "v"}}  # and the channels they are of
 MUCH = 0.5  # share of what is left above noise, from which another way is taken
-NO_MORE = 0.02  # mean square above noise that does not count
 NEARLY_HALF = 0.25  # samples by which half a sample may be missed
 ALIKE, LITTLE = 1.05, 2e-3  # times what is left, or share in power of what there was: fewer effects are preferred
 SAID = {
@@ -150,23 +149,26 @@ def _plain(plant: AxisPlant, way: str) -> Tried:
 
 
 def _beside(plant: AxisPlant, outcome: Outcome) -> str:
-    """The way that leaves less though nothing was fitted for it, or held where all sensors are half a sample late."""
+    """The likelier way, though nothing was fitted for it, or held where all sensors are half a sample late.
+
+    It counts where nothing but noise is left too: taken for straight, a held drive is half a sample early, in a swing
+    that is less drag than there is, and less drag is what tells a heavier axis from a drive that reads too much.
+    """
     if plant.plant.drive == "speed-loop":
         return plant.between
     blocks = range(len(plant.blocks))
     period = float(np.median([w.period for w in plant.windows if not w.static]))
     here = plant.between
 
-    def left(way: str) -> float:
+    def taken(way: str) -> Tried:
         plant.between = way
         point = _shorten_delays(outcome.point, (LATE[way] - LATE[here]) * period)
-        residuals = [r.ravel() for r in plant.residuals([point], blocks)[0]]
-        return max(float(np.mean(np.clip(np.concatenate(residuals), -8.0, 8.0) ** 2)) - 1.0, 0.0)
+        return Tried((), (), (), tuple(plant.residuals([point], blocks)[0]))
 
-    excess = {way: left(way) for way in LATE}
+    ways = {way: taken(way) for way in LATE}
     plant.between = here
-    best = min(excess, key=lambda way: excess[way])
-    if excess[best] < excess[here] - NO_MORE:
+    best = max(ways, key=lambda way: compare(ways[way], ways[here]).gain)
+    if compare(ways[best], ways[here]).gain > ODDS:
         return best
     seen = {name for b in plant.benches for name in b.roles.outputs}
     late = np.array([outcome.point.get(name, 0.0) for name, of in DELAYS.items() if seen & of]) / period

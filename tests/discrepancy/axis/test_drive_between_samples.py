@@ -1,0 +1,36 @@
+"""What a drive does between samples is decided where nothing but noise is left too: causes are told apart by it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import geared
+import pytest
+
+from ema.core.records import Cycle, Record
+from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.models.axis_config import RotaryAxis
+
+SMALL = geared.Axis(J=1.1e-5, F=7e-3, C=4.7e-6, k_t=0.0125)
+
+
+@pytest.fixture(scope="module")
+def outcome():
+    """A torque that reads 15 % too much, held between its samples; that of a heavier axis is straight and as good."""
+    (cycle,) = geared.record(replace(SMALL, reads=1.15), 7, seconds=8.0, size=0.7, loop=(40.0, 0.025)).cycles
+    channels = dict(cycle.channels)
+    channels["torque"] = SMALL.k_t * channels.pop("i_q")
+    declared = {**geared.plant(SMALL), "drive": "torque", "k_t": None, "C": SMALL.C, "fitted": []}
+    model = RotaryAxis.model_validate({k: v for k, v in declared.items() if v is not None})
+    return examined(AxisPlant(model, [Record((Cycle(0, channels),))], n_threads=1))
+
+
+def test_a_torque_that_reads_too_much_is_no_heavier_axis(outcome):
+    told = {name for e in outcome.effects for name in (e["name"], *e["indistinguishable_from"])}
+    assert "drive_gain" in told
+    assert outcome.verdict == "explained"
+
+
+def test_a_held_drive_is_told(outcome):
+    assert any("held until the next" in note for note in outcome.notes)
