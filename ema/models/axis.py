@@ -137,22 +137,28 @@ def is_flexible(numbers: Model) -> bool:
 
 
 def loads_after(
-    numbers: Model, offsets: NDArray[np.int64], t: Array, theta: Array, follows: NDArray[np.bool_], h_max: float
+    numbers: Model,
+    offsets: NDArray[np.int64],
+    t: Array,
+    theta: Array,
+    w: Array,
+    follows: NDArray[np.bool_],
+    h_max: float,
 ) -> Array:
     """Position and speed of the load behind a gear, shape (n, 2), at the end of each recorded motion of the motor.
 
     Parameters
     ----------
     offsets : array, shape (n + 1,)
-        Motion j is samples ``offsets[j]:offsets[j + 1]`` of `t` and `theta`.
+        Motion j is samples ``offsets[j]:offsets[j + 1]`` of `t`, `theta` and its speed `w`.
     follows : array of bool, shape (n,)
-        Whether a motion begins where the one before it ended; otherwise the load begins untwisted and at rest.
+        Whether a motion begins where the one before it ended; otherwise the load begins untwisted, as fast as the motor.
     """
 
     def along(of: slice, load: State) -> State:
         return kernel.load_after(numbers.z, t[of], theta[of], h_max, *load)
 
-    return _after(offsets, follows, lambda first: (theta[first], 0.0), along)
+    return _after(offsets, follows, lambda first: (theta[first], w[first]), along)
 
 
 def _after(
@@ -175,7 +181,13 @@ def has_memory(numbers: Model) -> bool:
 
 
 def bristles_after(
-    numbers: Model, offsets: NDArray[np.int64], t: Array, theta: Array, follows: NDArray[np.bool_], play: float
+    numbers: Model,
+    offsets: NDArray[np.int64],
+    t: Array,
+    theta: Array,
+    w: Array,
+    follows: NDArray[np.bool_],
+    play: float,
 ) -> Array:
     """Share of friction that is built up at the end of each recorded motion, shape (n,); see `loads_after`.
 

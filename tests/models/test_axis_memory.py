@@ -49,7 +49,7 @@ def test_noise_of_the_angle_is_no_way_back():
     """What is built up at the end of a motion that goes one way, with noise a tenth of the deflection."""
     model = axis.model(dry(), {"friction_memory": {"deflection": 0.01}})
     theta = np.linspace(0.0, 0.1, 200) + 1e-3 * np.random.default_rng(1).standard_normal(200)
-    motion = (np.array([0, 200]), np.arange(200.0), theta, np.array([False]))
+    motion = (np.array([0, 200]), np.arange(200.0), theta, np.gradient(theta), np.array([False]))
     assert axis.bristles_after(model, *motion, 3e-3)[0] == pytest.approx(1.0, abs=0.01)
     assert axis.bristles_after(model, *motion, 0.0)[0] < 0.9  # what the play is for
 

@@ -143,15 +143,22 @@ def test_the_load_follows_a_recorded_motion_through_the_gear():
     half = len(t) // 2
     parts = [slice(0, half), slice(half - 1, len(t))]
     offsets = np.array([0, half, len(t) + 1])
-    t_parts, theta_parts = (np.concatenate([x[part] for part in parts]) for x in (t, theta))
+    motion = (np.concatenate([x[part] for part in parts]) for x in (t, theta, slow * np.sin(slow * t)))
     follows = np.array([False, True])
-    theta_l, w_l = axis.loads_after(numbers, offsets, t_parts, theta_parts, follows, 1e-4)[-1]
+    theta_l, w_l = axis.loads_after(numbers, offsets, *motion, follows, 1e-4)[-1]
     d = 2.0 * 0.2 * np.sqrt(J_M * J_L / (J_M + J_L) / C_GEAR)
     stiff = 1.0 / C_GEAR + 1j * slow * d
     response = stiff / (stiff - J_L * slow**2)
     swing = -response * np.exp(1j * slow * t[-1])
     assert theta_l == pytest.approx(1.0 + swing.real, abs=2e-3)
     assert w_l == pytest.approx((1j * slow * swing).real, abs=2e-3 * slow)
+
+
+def test_a_load_of_which_nothing_is_known_before_moves_as_its_motor_does():
+    numbers = axis.model(FREE, {"gear_compliance": GEAR["gear_compliance"]})
+    t = np.arange(0.0, 0.01, 1e-3)
+    steady = (np.array([0, len(t)]), t, 40.0 * t, np.full(len(t), 40.0), np.array([False]), 1e-4)
+    assert axis.loads_after(numbers, *steady)[0] == pytest.approx([40.0 * t[-1], 40.0], rel=1e-6)
 
 
 def test_a_supply_that_sags_leaves_less_to_the_motor_and_asks_for_more():

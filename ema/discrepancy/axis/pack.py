@@ -37,20 +37,23 @@ class Pack:
         return self.drive if clock == 0.0 else np.concatenate([w.drive_by(clock) for w in self.windows])
 
     @cached_property
-    def history(self) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.bool_]]:
-        """Recorded motion before each window since the one before it: offsets, time, position, whether it follows."""
+    def history(self) -> tuple[NDArray[np.int64], Array, Array, Array, NDArray[np.bool_]]:
+        """Recorded motion before each window since the one before it.
+
+        Offsets, time, position, speed, and whether it follows.
+        """
         parts, follows = [], []
         last: tuple[int, int] | None = None
         for w in self.windows:
-            t, theta = w.before
+            t = w.before[0]
             first = max(0, int(np.searchsorted(t, t[-1] - MEMORY)))
             follows.append(last is not None and last[0] == w.chain and first < last[1] <= len(t))
             first = last[1] - 1 if follows[-1] and last is not None else first
-            parts.append((t[first:], theta[first:]))
+            parts.append(tuple(x[first:] for x in w.before))
             last = (w.chain, len(t))
-        offsets = np.concatenate(([0], np.cumsum([len(t) for t, _ in parts]))).astype(np.int64)
-        t, theta = (np.concatenate(column) for column in zip(*parts, strict=True))
-        return offsets, t, theta, np.array(follows)
+        offsets = np.concatenate(([0], np.cumsum([len(t) for t, *_ in parts]))).astype(np.int64)
+        t, theta, w = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return offsets, t, theta, w, np.array(follows)
 
     def split(self, rows: Array) -> dict[int, Array]:
         """Columns of `rows` by block."""

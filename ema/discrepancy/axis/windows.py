@@ -33,8 +33,8 @@ class Window:
     """Consecutive samples of one cycle, in arrays of shape (n_times,).
 
     `outputs` has one row per output channel of its record. `position`, `speed` are smooth; `static` windows hold
-    samples at rest with the `direction` of approach. `before` is time and position as recorded, from the last gap
-    (whose number is `chain`) up to the first sample. `course` is time and drive of the whole cycle.
+    samples at rest with the `direction` of approach. `before` is time, position as recorded and smooth speed, from the last
+    gap (whose number is `chain`) up to the first sample. `course` is time and drive of the whole cycle.
     """
 
     group: str
@@ -48,7 +48,7 @@ class Window:
     static: bool = False
     direction: Array | None = None
     stretch: int = 0
-    before: tuple[Array, Array] = (np.empty(0), np.empty(0))
+    before: tuple[Array, Array, Array] = (np.empty(0), np.empty(0), np.empty(0))
     course: tuple[Array, Array] = (np.empty(0), np.empty(0))
     chain: int = 0
 
@@ -124,18 +124,18 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
     t = cycle["t"]
     dt = cycle.period
     width = 2 * HALF + 1
+    gaps = np.flatnonzero(np.diff(t) > 5.0 * dt) + 1
     if who.position is not None:
         raw = cycle[who.position]
-        smooth = savgol_filter(raw, width, 2)
+        smooth = _smooth(raw, gaps, width)
     if who.speed is not None:
-        speed = savgol_filter(cycle[who.speed], width, 2)
+        speed = _smooth(cycle[who.speed], gaps, width)
     else:
-        speed = savgol_filter(raw, 2 * width - 1, 2, deriv=1, delta=dt)
+        speed = _smooth(raw, gaps, 2 * width - 1, dt)
     if who.position is None:
         raw = smooth = np.concatenate(([0.0], np.cumsum(np.diff(t) * 0.5 * (speed[1:] + speed[:-1]))))
     warmer = cycle["temp_w"] - T_REFERENCE if "temp_w" in cycle else np.zeros(n)
     cuts = _glitches(cycle, who, noise) if who.position is not None and who.speed is not None else np.array([], int)
-    gaps = np.flatnonzero(np.diff(t) > 5.0 * dt) + 1
     still = np.abs(speed) < AT_REST * START_NOISE * speed_noise(who, noise, dt)
     margin = HALF if who.speed is not None else 2 * HALF  # over which the smoothed speed mixes rest with motion
     rests = _rests(still | _reversals(speed), margin)
@@ -156,12 +156,22 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
                 columns = (t[rows], cycle[who.drive][rows], outputs, smooth[rows], speed[rows])
                 dT = float(np.mean(warmer[rows]))
                 gap = max(gap for gap in (0, *gaps.tolist()) if gap <= part[0])
-                before = (t[gap : part[0] + 1], raw[gap : part[0] + 1])
+                upto = slice(gap, int(part[0]) + 1)
+                before = (t[upto], raw[upto], speed[upto])
                 course, chain = (t, cycle[who.drive]), cycle.number * 1_000_000 + gap
                 out.append(
                     Window(group, label, *columns, dT, stretch=stretch, before=before, course=course, chain=chain)
                 )
     return out
+
+
+def _smooth(x: Array, gaps: NDArray[np.int_], width: int, dt: float | None = None) -> Array:
+    """Local quadratics over `width` samples, or with `dt` their slope, each part between gaps by itself."""
+    parts = np.split(x, gaps)
+    if dt is None:
+        return np.concatenate([savgol_filter(p, width, 2) if len(p) >= width else p for p in parts])
+    slope = (savgol_filter(p, width, 2, deriv=1, delta=dt) if len(p) >= width else np.zeros(len(p)) for p in parts)
+    return np.concatenate(list(slope))
 
 
 def speed_noise(who: Roles, noise: dict[str, Noise], period: float) -> float:

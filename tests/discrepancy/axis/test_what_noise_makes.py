@@ -132,13 +132,13 @@ def test_windows_of_a_record_lie_one_after_the_other_and_come_apart_again(quiet)
 
 def test_the_motion_before_a_window_is_followed_once_and_no_further_back_than_it_is_remembered(quiet):
     windows = list(quiet.windows)
-    offsets, t, _, follows = Pack(quiet.benches[0], list(range(len(windows))), windows, []).history
+    offsets, t, *_, follows = Pack(quiet.benches[0], list(range(len(windows))), windows, []).history
     assert not follows[0]
     assert follows[1:].all()
     assert [t[b - 1] for b in offsets[1:]] == [w.t[0] for w in windows]
     assert [t[a] for a in offsets[1:-1]] == [w.t[0] for w in windows[:-1]]  # from where the last one ended
     apart = [windows[0], windows[-1]]
-    offsets, t, _, follows = Pack(quiet.benches[0], [0, len(windows) - 1], apart, []).history
+    offsets, t, *_, follows = Pack(quiet.benches[0], [0, len(windows) - 1], apart, []).history
     assert follows.tolist() == [False, False]
     assert t[offsets[1] : offsets[2]].min() == pytest.approx(windows[-1].t[0] - MEMORY, abs=2e-3)
 
