@@ -88,7 +88,8 @@ def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None, lea
     """
     everything = np.concatenate([cycle[name] for cycle in cycles])
     step = resolution or max(quantum(cycle[name]) for cycle in cycles)
-    floor = max(step / np.sqrt(12.0), least, 1e-9 * float(np.std(everything)), 1e-12)
+    of_steps = step / np.sqrt(12.0)
+    floor = max(of_steps, least, 1e-9 * float(np.std(everything)), 1e-12)
     parts = [disagreement(cycle["t"], cycle[name]) for cycle in cycles if cycle.n_samples > 8]
     if not parts:
         return Noise(floor)
@@ -99,11 +100,11 @@ def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None, lea
     for low, high in pairwise(edges):
         inside = (slope >= low) & (slope <= high)
         if inside.sum() > 20:
-            variance.append(_robust_variance(r[inside]))
+            variance.append(_robust_variance(r[inside], of_steps))
             square.append(float(np.mean(slope[inside] ** 2)))
             weight.append(1.0 / max(variance[-1], floor**2))
     if not variance:
-        return Noise(max(floor, float(np.sqrt(_robust_variance(r)))))
+        return Noise(max(floor, float(np.sqrt(_robust_variance(r, of_steps)))))
     v, s, w = np.array(variance), np.array(square), np.array(weight)
     (a, b), _ = nnls(np.stack([w, w * s], axis=1), w * v)
     return Noise(max(float(np.sqrt(a)), floor), float(np.sqrt(b)))
@@ -130,8 +131,13 @@ def is_derived(cycle: Cycle, position: str, speed: str) -> bool:
     return bool(np.sqrt(np.mean((w[inside] - A @ c) ** 2)) < DERIVED * noise)
 
 
-def _robust_variance(r: Array) -> float:
-    """Variance without the wildest samples; by a high quantile where the tails are heavy (irregular sampling)."""
+def _robust_variance(r: Array, of_steps: float = 0.0) -> float:
+    """Variance without the wildest samples; by a high quantile where the tails are heavy (irregular sampling).
+
+    Where a channel's steps make most of it (rms `of_steps`), its tail is a step now and then, of which no quantile
+    says how large the rest is.
+    """
     wide = float(np.quantile(np.abs(r), 0.95))
     middle = r[np.abs(r) <= 2.0 * wide]
-    return max(float(np.mean(middle**2)) if middle.size else 0.0, (wide / 1.96) ** 2)
+    variance = float(np.mean(middle**2)) if middle.size else 0.0
+    return variance if variance < 2.0 * of_steps**2 else max(variance, (wide / 1.96) ** 2)
