@@ -8,7 +8,7 @@ import geared
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.between import examined
+from ema.discrepancy.axis.between import examine_ways
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
@@ -23,7 +23,7 @@ def outcome():
     channels["torque"] = SMALL.k_t * channels.pop("i_q")
     declared = {**geared.plant(SMALL), "drive": "torque", "k_t": None, "C": SMALL.C, "fitted": []}
     model = RotaryAxis.model_validate({k: v for k, v in declared.items() if v is not None})
-    return examined(AxisPlant(model, [Record((Cycle(0, channels),))], n_threads=1))
+    return examine_ways(AxisPlant(model, [Record((Cycle(0, channels),))], n_threads=1))
 
 
 def test_a_torque_that_reads_too_much_is_no_heavier_axis(outcome):
