@@ -89,6 +89,7 @@ def beside_truth(
         "visible": _visible(name, findings, _flaws(values, k), n_cycles, seed, motions, bench) if is_missed else None,
         "named": [[e["name"], *e["indistinguishable_from"]] for e in findings["effects"]],
         "confidence": [e["confidence"] for e in findings["effects"]],
+        "of_set": [e.get("of_set") for e in findings["effects"]],
         "parameter_errors": {p: found[p]["value"] / x - 1.0 for p, x in true.items() if x},
         "z": {p: (found[p]["value"] - x) / sd[p] for p, x in true.items() if sd[p] > 0.0},
         "covered": {p: found[p]["low"] <= x <= found[p]["high"] for p, x in true.items()}, **gain["heldout"],

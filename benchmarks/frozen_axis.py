@@ -60,6 +60,7 @@ def beside_truth(t: strata_axis.Trial, said: dict[str, Any]) -> dict[str, Any]:
         "named": [[e["name"], *e["indistinguishable_from"]] for e in effects],
         "confidence": [e["confidence"] for e in effects],
         "posterior": said.get("posterior", [])[:5],
+        "of_set": [e.get("of_set") for e in effects],
         "z": {name: (quantities[name]["value"] - x) / sd[name] for name, x in true.items() if sd[name] > 0.0},
         **said["gain"]["heldout"], "said": said["structure"].get("sentences", []),
     }  # fmt: skip

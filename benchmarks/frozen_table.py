@@ -84,10 +84,17 @@ def truth(row: Row) -> set[str]:
 def _answers(rows: Iterable[Row]) -> list[tuple[float, bool]]:
     """Stated probability of each named effect or set, and whether a true one, or what acts like it, is in it."""
     return [
-        (min(1.0, p * len(named)), bool(set(named) & (truth(row) | set(row.get("near", ())))))
+        (p, bool(set(named) & (truth(row) | set(row.get("near", ())))))
         for row in rows
-        for named, p in zip(row["named"], row["confidence"], strict=True)
+        for named, p in zip(row["named"], _of_sets(row), strict=True)
     ]
+
+
+def _of_sets(row: Row) -> list[float]:
+    """The probability of each set; rows before it was written have its first member's, taken to be each one's share."""
+    told = row.get("of_set") or [None] * len(row["named"])
+    shares = zip(told, row["named"], row["confidence"], strict=True)
+    return [min(1.0, p * len(named)) if of_set is None else of_set for of_set, named, p in shares]
 
 
 def reliability(answers: Sequence[tuple[float, bool]]) -> list[tuple[str, str, str]]:

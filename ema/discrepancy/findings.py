@@ -164,7 +164,7 @@ class Findings:
         return {
             "verdict": self.verdict,
             **({"unfinished": True, "leading": self.leading} if self.verdict == "unfinished" else {}),
-            "effects": [{**asdict(effect), "z": effect.z} for effect in self.effects],
+            "effects": [{**asdict(effect), "of_set": effect.of_set, "z": effect.z} for effect in self.effects],
             "structure": self.structure,
             "gain": {
                 "train": {"err_before": known(g.train_before), "err_after": known(g.train_after)},

@@ -59,6 +59,14 @@ def test_intervals_are_counted_at_three_levels():
         assert count / n == pytest.approx(p, abs=0.03)
 
 
+def test_a_set_is_as_sure_as_it_says_not_as_its_first_member_times_its_members():
+    """A set of two with 0.61 and 0.1 had counted as sure of 1."""
+    unsure = row(1, named=[["cogging", "resolver_error"]], confidence=[0.61], of_set=[0.71])
+    assert cells(frozen_table.table([row(0), unsure]), "confidently wrong")[1].startswith("0 of 2")
+    before = {name: x for name, x in unsure.items() if name != "of_set"}
+    assert cells(frozen_table.table([row(0), before]), "confidently wrong")[1].startswith("1 of 2")
+
+
 def test_an_effect_that_is_not_there_beside_one_that_is_counts_as_confidently_wrong():
     extra = row(1, named=[["spring_load"], ["cogging"]], confidence=[0.97, 0.95])
     text = frozen_table.table([row(), extra])
