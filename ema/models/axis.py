@@ -152,7 +152,7 @@ def loads_after(
     offsets : array, shape (n + 1,)
         Motion j is samples ``offsets[j]:offsets[j + 1]`` of `t`, `theta` and its speed `w`.
     follows : array of bool, shape (n,)
-        Whether a motion begins where the one before it ended; otherwise the load begins untwisted, as fast as the motor.
+        Whether a motion begins where the one before it ended; else the load begins untwisted, as fast as the motor.
     """
 
     def along(of: slice, load: State) -> State:

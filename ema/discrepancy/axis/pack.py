@@ -52,8 +52,8 @@ class Pack:
             parts.append(tuple(x[first:] for x in w.before))
             last = (w.chain, len(t))
         offsets = np.concatenate(([0], np.cumsum([len(t) for t, *_ in parts]))).astype(np.int64)
-        t, theta, w = (np.concatenate(column) for column in zip(*parts, strict=True))
-        return offsets, t, theta, w, np.array(follows)
+        t, theta, speed = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return offsets, t, theta, speed, np.array(follows)
 
     def split(self, rows: Array) -> dict[int, Array]:
         """Columns of `rows` by block."""

@@ -33,8 +33,8 @@ class Window:
     """Consecutive samples of one cycle, in arrays of shape (n_times,).
 
     `outputs` has one row per output channel of its record. `position`, `speed` are smooth; `static` windows hold
-    samples at rest with the `direction` of approach. `before` is time, position as recorded and smooth speed, from the last
-    gap (whose number is `chain`) up to the first sample. `course` is time and drive of the whole cycle.
+    samples at rest with the `direction` of approach. `before` is time, position as recorded and smooth speed, from the
+    last gap (whose number is `chain`) up to the first sample. `course` is time and drive of the whole cycle.
     """
 
     group: str
@@ -128,10 +128,7 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
     if who.position is not None:
         raw = cycle[who.position]
         smooth = _smooth(raw, gaps, width)
-    if who.speed is not None:
-        speed = _smooth(cycle[who.speed], gaps, width)
-    else:
-        speed = _smooth(raw, gaps, 2 * width - 1, dt)
+    speed = _smooth(cycle[who.speed], gaps, width) if who.speed is not None else _smooth(raw, gaps, 2 * width - 1, dt)
     if who.position is None:
         raw = smooth = np.concatenate(([0.0], np.cumsum(np.diff(t) * 0.5 * (speed[1:] + speed[:-1]))))
     warmer = cycle["temp_w"] - T_REFERENCE if "temp_w" in cycle else np.zeros(n)
