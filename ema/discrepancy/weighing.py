@@ -35,7 +35,9 @@ class Weighed:
         return {key: own, **{other: q for other, q in trials.items() if q > 0.0 and q >= IN_SET * whole}}
 
     def described(self) -> list[dict[str, Any]]:
-        """For findings.json (`Findings.posterior`)."""
+        """For findings.json (`Findings.posterior`); nothing where there is no set beside the model without effects."""
+        if len(self.entries) < 2:
+            return []
         top = max(e.log_evidence for e in self.entries)
         return [
             {

@@ -99,6 +99,12 @@ def test_what_is_there_is_sure_and_alone_where_nothing_looks_like_it():
     assert found.described()[0]["effects"] == ["one"]
 
 
+def test_without_anything_fitted_no_probability_is_told():
+    rng = np.random.default_rng(3)
+    plain = model({}, rng.standard_normal(N))
+    assert weigh_sets(plain, plain, []).described() == []
+
+
 def test_what_looks_alike_shares_what_is_sure_of_the_set():
     found = weighed(0.9999, 1.0).instead("one")
     assert set(found) == {"one", "other"}
