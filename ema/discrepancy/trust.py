@@ -17,22 +17,25 @@ from .weighing import Weighed, weigh_sets
 
 
 def drop_unlikely(plant: Plant, state: State, progress: Progress) -> tuple[dict[str, float], Weighed]:
-    """Leave out effects that are no causes: what they explain is a rest without a name. The trust in those that stay.
+    """Leave out effects that are no causes: what they explain is a rest without a name. The trust in all.
 
     These are the unlikeliest together with all that the data cannot tell from them, and, where much stays unexplained,
     those that lean on the bounds of what is credible.
     """
+    known: dict[str, float] = {}
     while True:
         trust, weighed = _trust(plant, state), weigh_sets(state.plain, state.model, state.rounds)
         explained = is_explained(plant, state.plain, state.model)
         odds = {}
         for k, c in enumerate(state.model.accepted):
             if not c.is_structure:
-                no_cause = not explained and leans_in_a_fold(state.model, k)
-                odds[c.key] = 0.0 if no_cause else trust[c.key] * sum(weighed.instead(c.key).values())
+                if not explained and leans_in_a_fold(state.model, k):
+                    trust[c.key] = 0.0
+                odds[c.key] = trust[c.key] * sum(weighed.instead(c.key).values())
+        known.update(trust)
         worst = min(odds, key=lambda key: odds[key], default=None)
         if worst is None or odds[worst] >= NAMED:
-            return trust, weighed
+            return known, weighed
         progress(f"without {worst}, which is unlikely")
         k = [c.key for c in state.model.accepted].index(worst)
         without = leave_out(plant, state.model, {k})

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from .engine.posterior import PRIOR, Entry, p_cause, posterior
+from .engine.posterior import PRIOR, Entry, p_cause, posterior, thin
 from .selection import NEARLY_NOISE, SAME_SHARE, Tried, is_nameless, log_scores
 
 IN_SET = 0.05  # share of what is sure of a set, below which a member is none: the others are a set of 95 %
@@ -34,11 +34,18 @@ class Weighed:
         whole = own + sum(trials.values())
         return {key: own, **{other: q for other, q in trials.items() if q > 0.0 and q >= IN_SET * whole}}
 
-    def described(self) -> list[dict[str, Any]]:
-        """For findings.json (`Findings.posterior`); nothing where there is no set beside the model without effects."""
+    def described(self, trust: Mapping[str, float]) -> list[dict[str, Any]]:
+        """For findings.json (`Findings.posterior`); nothing where there is no set beside the model without effects.
+
+        `trust`: how far each effect that the model has, or had, stands out of what is unknown; what may be in its
+        place stands out as far.
+        """
         if len(self.entries) < 2:
             return []
-        top = max(e.log_evidence for e in self.entries)
+        share = {other: trust.get(key, 1.0) for key, trials in self.in_place.items() for other in trials}
+        keys = {key for e in self.entries for key in e.causes}
+        entries = thin(self.entries, {**dict.fromkeys(keys, 1.0), **share, **trust})
+        top = max(e.log_evidence for e in entries)
         return [
             {
                 "effects": [self.effects[key] for key in e.causes if key in self.effects],
@@ -47,7 +54,7 @@ class Weighed:
                 "nats_behind": top - e.log_evidence,
                 "nats_error": e.error,
             }
-            for e in self.entries
+            for e in entries
             if e.probability >= TOLD
         ]
 

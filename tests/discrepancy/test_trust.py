@@ -75,18 +75,18 @@ def named(small, acting):
     rounds = [({"large": both}, plant.tried("small")), ({"small": both}, plant.tried("large"))]
     state = State(plant.tried(), both, rounds, [])
     trust, _ = drop_unlikely(plant, state, Progress())
-    return trust, [row["name"] for row in state.unlikely]
+    return [c.key for c in state.model.accepted], trust, [row["name"] for row in state.unlikely]
 
 
 def test_a_small_effect_that_looks_like_no_other_law_is_as_sure_as_it_stands_out():
     other = SMALL * np.random.default_rng(3).standard_normal((N_BLOCKS, N))
-    trust, unlikely = named(lambda large: other, lambda large, small: small)
+    _, trust, unlikely = named(lambda large: other, lambda large, small: small)
     assert trust["small"] > 0.9
     assert unlikely == []
 
 
 def test_what_another_law_would_make_were_it_stronger_in_some_blocks_is_told_as_considered():
     late = (np.arange(N_BLOCKS) >= N_BLOCKS // 2)[:, None]
-    trust, unlikely = named(lambda large: 0.1 * late * large, lambda large, small: small)
-    assert list(trust) == ["large"]
+    stays, _, unlikely = named(lambda large: 0.1 * late * large, lambda large, small: small)
+    assert stays == ["large"]
     assert unlikely == ["small"]

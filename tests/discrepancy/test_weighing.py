@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from ema.discrepancy.engine.posterior import posterior
+from ema.discrepancy.engine.posterior import Entry, p_cause, posterior, thin
 from ema.discrepancy.fitting import Fit
 from ema.discrepancy.plant import Candidate, Free
 from ema.discrepancy.selection import Tried
@@ -96,13 +96,22 @@ def test_what_is_there_is_sure_and_alone_where_nothing_looks_like_it():
     found = weighed(0.3, 1.0)
     assert list(found.instead("one")) == ["one"]
     assert found.instead("one")["one"] > 0.99
-    assert found.described()[0]["effects"] == ["one"]
+    assert found.described({})[0]["effects"] == ["one"]
+
+
+def test_what_may_stand_for_something_unknown_takes_its_share_of_every_set():
+    sets = {("a", "b"): 0.9, ("a",): 0.1}
+    entries = thin([Entry(causes, p, np.log(p), 0.0) for causes, p in sets.items()], {"a": 0.8, "b": 0.5})
+    assert sum(e.probability for e in entries) == pytest.approx(1.0)
+    assert p_cause(entries, "a") == pytest.approx(0.8)
+    assert p_cause(entries, "b") == pytest.approx(0.9 * 0.5)
+    assert {e.causes: e.probability for e in entries}[()] == pytest.approx(0.9 * 0.2 * 0.5 + 0.1 * 0.2)
 
 
 def test_without_anything_fitted_no_probability_is_told():
     rng = np.random.default_rng(3)
     plain = model({}, rng.standard_normal(N))
-    assert weigh_sets(plain, plain, []).described() == []
+    assert weigh_sets(plain, plain, []).described({}) == []
 
 
 def test_what_looks_alike_shares_what_is_sure_of_the_set():
@@ -113,7 +122,7 @@ def test_what_looks_alike_shares_what_is_sure_of_the_set():
 
 
 def test_nothing_is_likelier_than_a_cause_that_the_record_does_not_need():
-    assert weighed(0.3, 0.0).described()[0]["effects"] == []
+    assert weighed(0.3, 0.0).described({})[0]["effects"] == []
 
 
 def test_a_law_of_another_form_makes_likelihoods_less_sure():

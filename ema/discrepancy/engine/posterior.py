@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.special import logsumexp
@@ -12,6 +13,7 @@ from .hypothesis import Array, Cause
 
 DRAWS = 4096  # of the evidence's own error
 SEED = 20_261_124
+TINY = 1e-300
 PRIOR = 0.02  # probability that one given cause is there; some thirty make one likely in every other record
 
 
@@ -70,3 +72,22 @@ def posterior(
 def p_cause(entries: Sequence[Entry], name: str) -> float:
     """Probability that a cause is there, over all sets."""
     return sum(entry.probability for entry in entries if name in entry.causes)
+
+
+def thin(entries: Sequence[Entry], share: Mapping[str, float]) -> list[Entry]:
+    """The same sets where each cause is there with a `share` only, and else stands for something without a name.
+
+    A cause is then there with its probability times its share. Log evidence becomes that of the probability. [nats]
+    """
+    p: dict[tuple[str, ...], float] = {}
+    most: dict[tuple[str, ...], Entry] = {}
+    for entry in entries:
+        for there in product((True, False), repeat=len(entry.causes)):
+            weights = [
+                share[c] if is_there else 1.0 - share[c] for c, is_there in zip(entry.causes, there, strict=True)
+            ]
+            left = tuple(c for c, is_there in zip(entry.causes, there, strict=True) if is_there)
+            p[left] = p.get(left, 0.0) + entry.probability * float(np.prod(weights))
+            most[left] = max(most.get(left, entry), entry, key=lambda e: e.probability)
+    order = sorted(p, key=lambda causes: -p[causes])
+    return [Entry(causes, p[causes], float(np.log(max(p[causes], TINY))), most[causes].error) for causes in order]
