@@ -117,9 +117,10 @@ def test_an_effect_that_a_later_one_makes_superfluous_is_left_out():
     state = State(plain, plain, [], [])
     select(toy, state, progress)
     assert [c.key for c in state.model.accepted] == ["b"]
-    assert drop_unlikely(toy, state, progress)["b"] > 0.9
+    trust, weighed = drop_unlikely(toy, state, progress)
+    assert trust["b"] > 0.9
     final = fit(toy, [*toy.base, *state.model.accepted[0].free], state.model.fits[0].point, range(N_BLOCKS))
-    (told,) = describe_effects(toy, state, {"b": 1.0}, final.point, final.draw)
+    (told,) = describe_effects(toy, state, {"b": 1.0}, weighed, final.point, final.draw)
     assert told["name"] == "b"
 
 

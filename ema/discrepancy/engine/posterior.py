@@ -83,11 +83,9 @@ def thin(entries: Sequence[Entry], share: Mapping[str, float]) -> list[Entry]:
     most: dict[tuple[str, ...], Entry] = {}
     for entry in entries:
         for there in product((True, False), repeat=len(entry.causes)):
-            weights = [
-                share[c] if is_there else 1.0 - share[c] for c, is_there in zip(entry.causes, there, strict=True)
-            ]
             left = tuple(c for c, is_there in zip(entry.causes, there, strict=True) if is_there)
-            p[left] = p.get(left, 0.0) + entry.probability * float(np.prod(weights))
+            weight = [share[c] if c in left else 1.0 - share[c] for c in entry.causes]
+            p[left] = p.get(left, 0.0) + entry.probability * float(np.prod(weight))
             most[left] = max(most.get(left, entry), entry, key=lambda e: e.probability)
     order = sorted(p, key=lambda causes: -p[causes])
     return [Entry(causes, p[causes], float(np.log(max(p[causes], TINY))), most[causes].error) for causes in order]
