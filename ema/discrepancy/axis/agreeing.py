@@ -40,6 +40,7 @@ def merge(
         name = name_law(b, term)
         own = [k for k, e in enumerate(out) if e.name == name and _is_same(e, effects(b, term)[name])]
         for k in own:
+            out[k] = _with_pairs(out[k], b, term)
             if out[k].indistinguishable_from:
                 continue
             out[k] = replace(out[k], confidence=max(out[k].confidence, round(b.confidence(term), 4)))
@@ -54,6 +55,15 @@ def merge(
     if b is None or not added:
         return out, None
     return [*out, *name_laws(plant, b, added)], b
+
+
+def _with_pairs(e: shared.FoundEffect, b: Balance, term: Term) -> shared.FoundEffect:
+    """With what does as well in the balance beside one law more: free runs try one in the place of another, not two."""
+    pairs = {r.laws[-1].name for r in term.instead if len(r.laws) > len(b.model.laws)}
+    others = tuple(sorted({*e.indistinguishable_from, *pairs}))
+    if len(others) == len(e.indistinguishable_from):
+        return e
+    return replace(e, confidence=round(e.of_set / (1 + len(others)), 4), indistinguishable_from=others, of_others=None)
 
 
 def _limit(term: Term, share: float) -> Term:

@@ -14,8 +14,7 @@ from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
 from .balance.as_effects import effects
-from .balance.found import Balance, Term
-from .balance.telling import draw
+from .balance.found import Balance, Term, draw
 from .balance.telling_records import INTERVAL
 from .linear import of_axis
 

@@ -21,10 +21,10 @@ from ema.discrepancy.outcome import Outcome
 from ema.models.axis_config import LinearAxis
 
 from .balance.as_effects import effects, point
-from .balance.found import Balance
+from .balance.found import Balance, draw
 from .balance.needed import ALARM, chance
 from .balance.regression import regress
-from .balance.telling import draw, of_law
+from .balance.telling import of_law
 from .named_laws import find_missing, name_laws
 
 if TYPE_CHECKING:

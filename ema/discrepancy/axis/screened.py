@@ -13,16 +13,24 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 from ema.models.axis_config import LINES, Axis
 
-from .balance.as_effects import effects, find_alternatives, line_point
+from .balance.as_effects import effects, errors, find_alternatives, line_point
 from .balance.found import Balance
 
 SCREENED = (
     *("viscous_by_direction", "pendulum", "output_load_friction", "drive_unequal", "viscous_slope", "friction_slope"),
-    *("gear_error", "quadratic_load_friction", "quadratic_output_load_friction", "friction_memory"),
+    *(
+        "stiffening_spring",
+        "gear_error",
+        "quadratic_load_friction",
+        "quadratic_output_load_friction",
+        "friction_memory",
+    ),
     *("friction_drift", "viscous_drift", "friction_by_temperature", "viscous_by_temperature"),
 )
 ROOM = 10.0  # times the size that the regression found, to which a fit may go
-FIXED = ("turns", "centre", "since", "coefficient", "damping")  # parameters that the records of one bench hardly show
+FIXED = (  # parameters that the records of one bench hardly show
+    *("turns", "centre", "half", "over", "since", "coefficient", "damping"),
+)
 
 
 def suggest_by_balance(balance: Balance | None, plant: Axis, point: Point) -> list[Candidate]:
@@ -32,18 +40,19 @@ def suggest_by_balance(balance: Balance | None, plant: Axis, point: Point) -> li
     have = {name.split(".")[0] for name in point} | set(plant.effects)
     out = []
     for term in balance.terms:
+        unsure = errors(balance, term)
         for name, values in (find_alternatives(balance, term) | effects(balance, term)).items():
             if name not in SCREENED:
                 continue
-            law = begin_at(name, values)
+            law = begin_at(name, values, unsure.get(name, {}))
             if not ({f.name for f in law.free} & point.keys() if name in LINES else name in have):
                 out.append(law)
     return out
 
 
-def begin_at(name: str, values: dict[str, float]) -> Candidate:
-    """An effect that is fitted from where the balance has it."""
-    return (_line if name in LINES else _candidate)(name, values)
+def begin_at(name: str, values: dict[str, float], unsure: dict[str, float]) -> Candidate:
+    """An effect that is fitted from where the balance has it, with the room of its values and of their errors."""
+    return _line(name, values) if name in LINES else _candidate(name, values, unsure)
 
 
 def _line(name: str, values: dict[str, float]) -> Candidate:
@@ -52,7 +61,7 @@ def _line(name: str, values: dict[str, float]) -> Candidate:
     return Candidate(f"{name}:{values['order']:.5g}", name, free, (start,), dict.fromkeys(start, 0.0))
 
 
-def _candidate(name: str, values: dict[str, float]) -> Candidate:
+def _candidate(name: str, values: dict[str, float], unsure: dict[str, float]) -> Candidate:
     effect = registry()[name]
     free = []
     for p in effect.parameters:
@@ -62,7 +71,8 @@ def _candidate(name: str, values: dict[str, float]) -> Candidate:
         if p.name == "phase":
             free.append(Free(f"{name}.{p.name}", p.unit, value - np.pi, value + np.pi, value, 0.1))
         else:
-            low = 0.0 if p.low == 0.0 else -ROOM * abs(value)
-            free.append(Free(f"{name}.{p.name}", p.unit, low, ROOM * abs(value), value, 0.1 * abs(value)))
+            size = max(abs(value), unsure.get(p.name, 0.0))
+            low = 0.0 if p.low == 0.0 else -ROOM * size
+            free.append(Free(f"{name}.{p.name}", p.unit, low, ROOM * size, value, 0.1 * size))
     start = {f"{name}.{key}": value for key, value in values.items()}
     return Candidate(name, name, tuple(free), (start,), {free[0].name: effect.neutral()[effect.parameters[0].name]})

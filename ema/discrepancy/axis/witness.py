@@ -15,7 +15,7 @@ from ema.core.records import Array
 from ema.discrepancy.fitting import WILD, best_fit, fit
 from ema.discrepancy.plant import Point
 
-from .balance.as_effects import effects
+from .balance.as_effects import effects, errors
 from .balance.found import Balance, Term
 from .screened import begin_at
 
@@ -36,9 +36,9 @@ def measure_support(plant: AxisPlant, point: Point, b: Balance, term: Term) -> f
     blocks = list(range(len(plant.blocks)))
     without = fit(plant, plant.base, point, blocks, max_iterations=N_ITERATIONS)
     here = excess(without.residuals)
-    taken = 0.0
+    taken, unsure = 0.0, errors(b, term)
     for name, values in effects(b, term).items():
-        law = begin_at(name, values)
+        law = begin_at(name, values, unsure.get(name, {}))
         starts = [{**point, **start} for start in law.starts]
         fitted = best_fit(plant, [*plant.base, *law.free], starts, blocks, max_iterations=N_ITERATIONS)
         taken = max(taken, 1.0 - excess(fitted.residuals) / max(here, 1e-300))

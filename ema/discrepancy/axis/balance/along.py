@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebvander
 
 from ema.core.records import Array
+from ema.discrepancy.axis.linear import in_metres
+from ema.effects.stiffening_spring import EFFECT, bends, tilts
 
-from .law import BY_RECORD, Columns, Law, Values, one
+from .law import BY_RECORD, Acting, Columns, Law, Values, one
 from .motion import Motion
-from .units import Units
+from .units import LINEAR, Units
 
 N_PLACES, N_ORDERS = 12, 320  # members of a family
 LEAST_TURN = 0.3  # [rad] of travel that shows a sine of the angle apart from a straight line
@@ -18,6 +21,9 @@ HIGHEST_ORDER = 260.0
 FEWEST_PERIODS = 2.0  # of a line within the travel
 CLOSED = 0.1  # of a period: a map of one turn ends a step before it begins
 STRETCHES = (0.05, 0.15)  # half widths of a stretch of other friction, of the travel
+GROWTHS = (0.3, 1.0, 1.3, 1.7, 2.2, 2.9, 3.7, 4.8)  # exponents from the middle of the travel to an end: what stiffens
+N_POLYNOMIALS = 10  # of a torque along the travel that has no name
+STIFFENING, ANY = "stiffening spring", "torque along the travel"
 TORQUE_LINE, TRAVEL_LINE, GEAR_LINE = "torque line", "line along the travel", "line of the gear"
 LINES = tuple(  # several may act
     f"{name}{more}" for name in (TORQUE_LINE, TRAVEL_LINE, GEAR_LINE) for more in ("", BY_RECORD)
@@ -29,6 +35,8 @@ def by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[L
     span = float(np.ptp(m.theta))
     centre = 0.5 * float(m.theta.max() + m.theta.min())
     yield _spring(centre, u)
+    yield from (_stiffening(centre, 0.5 * span, growth, u) for growth in GROWTHS)
+    yield _any(centre, 0.5 * span, u)
     if not linear:
         yield from (_pendulum(u, turns) for turns in dict.fromkeys((1.0, m.turns)) if turns * span > LEAST_TURN)
     if not linear and span > LEAST_TURN:
@@ -105,6 +113,52 @@ def _spring(centre: float, u: Units) -> Law:
         f"a spring (or a cable) of {{stiffness:.3g}} {u.torque}/{u.place}, at rest at {{zero:.3g}} {u.place}",
         "slow motion over the whole travel",
         n_columns=2,
+    )
+
+
+def _stiffening(centre: float, half: float, growth: float, u: Units) -> Law:
+    """b + c_1 x + c_2 `bends` + c_3 `tilts`, of x = -1 … 1 over the travel"""
+
+    def columns(m: Motion, _: Acting) -> tuple[Array, ...]:
+        x = (m.theta - centre) / half
+        return np.ones(len(x)), x, np.asarray(bends(x, growth)), np.asarray(tilts(x, growth))
+
+    def values(c: Array) -> Mapping[str, float]:
+        bias, middle, bent, tilted = (float(x) for x in c)
+        torques = {"middle": middle, "lower": middle + bent - tilted, "upper": middle + bent + tilted}
+        stiff = {name: torque / half for name, torque in torques.items()}
+        return {**stiff, "bias": bias, "centre": centre, "half": half, "over": half / growth}
+
+    stiffness = f"{u.torque}/{u.place}"
+    return Law(
+        STIFFENING,
+        f"{STIFFENING} {growth:g}",
+        EFFECT.name,
+        columns,
+        {"middle": stiffness, "lower": stiffness, "upper": stiffness, "bias": u.torque},
+        values,
+        in_metres(EFFECT.sentence) if u is LINEAR else EFFECT.sentence,
+        EFFECT.separated_by,
+        n_columns=4,
+    )
+
+
+def _any(centre: float, half: float, u: Units) -> Law:
+    """Whatever a torque does along the travel, as Chebyshev's polynomials: it has no name."""
+
+    def columns(m: Motion, _: Acting) -> tuple[Array, ...]:
+        return tuple(chebvander((m.theta - centre) / half, N_POLYNOMIALS - 1).T)
+
+    return Law(
+        ANY,
+        ANY,
+        "position_torque",
+        columns,
+        {"size": u.torque},
+        lambda c: {"size": float(np.linalg.norm(c[1:]))},
+        f"a {u.said} that is a function of the position, {{size:.3g}} {u.torque}, of no form that has a name",
+        "slow motion over the whole travel, and the same with what hangs or pulls at the axis taken off",
+        n_columns=N_POLYNOMIALS,
     )
 
 

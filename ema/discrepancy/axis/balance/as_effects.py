@@ -9,9 +9,10 @@ import numpy as np
 from ema.core.records import Array
 from ema.discrepancy.axis.naming import line
 from ema.discrepancy.plant import Point
+from ema.effects.stiffening_spring import EFFECT
 from ema.models.axis_config import LINES
 
-from .found import Balance, Term
+from .found import Balance, Term, draw
 from .law import Law
 
 Effects = dict[str, dict[str, float]]
@@ -25,6 +26,15 @@ def effects(b: Balance, term: Term, coefficients: Array | None = None) -> Effect
     """
     c = b.corrected.coefficients if coefficients is None else coefficients
     return _of_law(b, term.law, c[b.model.part(term.law)])
+
+
+def errors(b: Balance, term: Term) -> Effects:
+    """Standard deviations of the parameters that `effects` gives."""
+    samples = [effects(b, term, c) for c in draw(b)]
+    return {
+        name: {p: float(np.std([own[name][p] for own in samples if name in own])) for p in values}
+        for name, values in effects(b, term).items()
+    }
 
 
 def find_alternatives(b: Balance, term: Term) -> Effects:
@@ -155,5 +165,6 @@ _MAKERS: Mapping[str, _Maker] = {
     "stribeck": _stribeck,
     "position_friction": _stretch,
     "spring_load": _spring,
+    "stiffening_spring": _as_it_is("stiffening_spring", *(p.name for p in EFFECT.parameters)),
     "drive_unequal": _unequal,
 }

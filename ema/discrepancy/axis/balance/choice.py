@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from .along import LINES
+from .along import ANY, LINES
 from .found import Balance, Term
 from .law import BY_RECORD, BY_RECORD_NAME, Law
 from .links import LINKS
-from .needed import ALARM, Asked, chance, families_held, is_needed
+from .needed import ALARM, SIMPLER, Asked, chance, families_held, is_needed, simpler_families
 from .regression import Corrected, Plain, Regression, regress
 from .rows import Rows
 
@@ -34,8 +34,12 @@ def choose_laws(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence
         if best is None or not is_needed(best, model, asked):
             break
         model = _revise(found, plain, best, every, asked)
-    while (fewer := _exchange(found, plain, model, every, asked)) is not None:
+    for _ in range(2 * MOST_LAWS):
+        fewer = _exchange(found, plain, model, every, asked)
+        if fewer is None:
+            break
         model = fewer
+    model = _best_members(found, plain, model, every)
     terms = tuple(_term(found, plain, model, law, every, asked) for law in model.laws if law.key not in declared)
     return Balance(
         model, Corrected(model.coefficients, model.covariance()), plain, terms, drive,
@@ -60,8 +64,13 @@ def _choose_simplest(trials: Sequence[Regression], asked: Asked) -> Regression |
     best = min(trials, key=lambda r: r.loss, default=None)
     if best is None:
         return None
-    held = [r for r in trials if r.laws[-1].family in families_held(best.laws[-1].family)]
-    return next((r for r in held if not is_needed(best, r, asked)), best)
+    simpler = [r for r in trials if r.laws[-1].family in simpler_families(best.laws[-1].family)]
+    return _smallest(simpler, best, asked) or best
+
+
+def _smallest(trials: Sequence[Regression], best: Regression, asked: Asked) -> Regression | None:
+    """Of those beside which the best is not needed, the one with fewest coefficients."""
+    return min((r for r in trials if not is_needed(best, r, asked)), key=lambda r: (_size(r), r.loss), default=None)
 
 
 def _try_each(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) -> list[Regression]:
@@ -96,6 +105,16 @@ def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
     return members[int(np.argmax(gains))]
 
 
+def _best_members(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) -> Regression:
+    """With that member of each family that fits best beside the laws that came after it."""
+    for law in [own for own in model.laws if own.family not in LINES]:
+        without = regress(found, plain, [own for own in model.laws if own.key != law.key])
+        members = [own for own in every if (own.family, own.name) == (law.family, law.name)] or [law]
+        other = regress(found, plain, _add(without, _best(found, without, members)))
+        model = other if other.loss < model.loss else model
+    return model
+
+
 def _revise(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], asked: Asked) -> Regression:
     """Without laws that later ones made superfluous, or with another in their place that does clearly better."""
     for law in model.laws[:-1]:
@@ -105,14 +124,24 @@ def _revise(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], 
         if not is_needed(model, without, asked):
             model = without
             continue
-        other = _choose_simplest(_try_each(found, plain, without, every), asked)
+        trials = _try_each(found, plain, without, every)
+        simpler = [r for r in trials if r.laws[-1].family in simpler_families(law.family)]
+        if (smaller := _smallest(simpler, model, asked)) is not None:
+            model = smaller
+            continue
+        other = _choose_simplest(trials, asked)
         if other is not None and other.laws[-1].key != law.key and is_needed(other, model, asked):
             model = other
     return model
 
 
 def _exchange(found: Rows, plain: Plain, model: Regression, every: Sequence[Law], asked: Asked) -> Regression | None:
-    """A model of fewer laws that leaves no more: one law may do what several stood in for."""
+    """A model of fewer coefficients or laws that leaves no more: one law may do what several stood in for."""
+    for law in model.laws:
+        without = regress(found, plain, [own for own in model.laws if own.key != law.key])
+        ways = [r for r in _simpler_ways(found, plain, without, law, every) if _size(r) < _size(model)]
+        if (smaller := _smallest(ways, model, asked)) is not None:
+            return smaller
     single = [law for law in model.laws if law.family not in (*LINES, LINKS)]
     for trial in _try_each(found, plain, model, every) if len(single) > 1 else ():
         reduced = trial
@@ -120,11 +149,16 @@ def _exchange(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]
             without = regress(found, plain, [own for own in reduced.laws if own.key != law.key])
             if not is_needed(reduced, without, asked):
                 reduced = without
-        if len(reduced.laws) < len(model.laws) and not is_needed(model, reduced, asked):
+        if _size(reduced) < _size(model) and not is_needed(model, reduced, asked):
             return reduced
         if len(reduced.laws) == len(model.laws) and is_needed(reduced, model, asked):
             return reduced
     return None
+
+
+def _size(model: Regression) -> tuple[int, int]:
+    """Coefficients, and laws that they belong to."""
+    return len(model.coefficients), len(model.laws)
 
 
 def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequence[Law], asked: Asked) -> Term:
@@ -137,9 +171,10 @@ def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequenc
             siblings.setdefault(other.name, []).append(other)
     same = [regress(found, plain, _add(without, _best(found, without, own))) for own in siblings.values()]
     rivals: dict[str, Regression] = {}
-    for r in [*others, *same]:
+    for r in [*others, *same, *_simpler_ways(found, plain, without, law, every)]:
         own = r.laws[-1].name.removesuffix(BY_RECORD_NAME)
-        if law.family in families_held(r.laws[-1].family) and not is_needed(r, model, replace(asked, whole=0.0)):
+        asks = asked if r.laws[-1].family == ANY else replace(asked, whole=0.0)  # a form that is inexact is a name
+        if law.family in simpler_families(r.laws[-1].family) and not is_needed(r, model, asks):
             continue  # it can do what this law does and more, and need not
         if own != law.name.removesuffix(BY_RECORD_NAME) and (own not in rivals or r.loss < rivals[own].loss):
             rivals[own] = r
@@ -155,6 +190,18 @@ def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequenc
     common = float(np.mean([model.shared(law, r) for r in others])) if others else 0.0
     power = (without.loss - model.loss) / max(int(found.whole.sum()), 1)
     return Term(law, power, share[law.name], alike, common, tuple(rivals[name] for name in alike))
+
+
+def _simpler_ways(found: Rows, plain: Plain, without: Regression, law: Law, every: Sequence[Law]) -> list[Regression]:
+    """In place of a law that bends what it holds: one that it holds and one more, or that one alone."""
+    if law.family not in SIMPLER:
+        return []
+    simpler = [own for own in every if own.family in simpler_families(law.family)]
+    begun = [without]
+    for family in families_held(law.family):
+        if held := [own for own in simpler if own.family == family]:
+            begun.append(regress(found, plain, _add(without, _best(found, without, held))))
+    return [r for own in begun for r in _try_each(found, plain, own, simpler)]
 
 
 def _wins(name: str, model: Regression, rivals: Mapping[str, Regression]) -> dict[str, float]:

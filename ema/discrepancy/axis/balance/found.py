@@ -5,12 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ema.core.records import Array
+
 from .law import BY_RECORD
 
 if TYPE_CHECKING:
     from .agreement import Agreement
     from .law import Law
     from .regression import Corrected, Plain, Regression
+
+
+N_DRAWS = 400
 
 
 @dataclass(frozen=True)
@@ -86,3 +93,9 @@ class Balance:
     def explained(self, left: float) -> float:
         """Share of the drive's torque, as a coefficient of determination."""
         return 1.0 - left / self.drive
+
+
+def draw(b: Balance) -> Array:
+    """Coefficients drawn from their uncertainty, shape (N_DRAWS, n)."""
+    rng = np.random.default_rng(0)
+    return rng.multivariate_normal(b.corrected.coefficients, b.corrected.covariance, N_DRAWS, method="eigh")

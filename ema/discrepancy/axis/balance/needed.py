@@ -23,6 +23,7 @@ from ema.core.records import Array
 from ema.discrepancy import blocks_left_out
 from ema.discrepancy.axis.noise import ESTIMATE_UNCERTAINTY
 
+from .along import ANY, GEAR_LINE, STIFFENING, TORQUE_LINE, TRAVEL_LINE
 from .law import BY_RECORD, Law
 from .links import LINKS
 from .regression import LEAST as ON_ONE_BLOCK
@@ -34,7 +35,16 @@ MATTERS = 0.1  # share of what is left that a law must take
 LEAST = 3e-4  # share of the drive's torque in power that a law must take, where more is left than it takes
 SEEN = 1e-6  # of a column that stands out of those of the other laws
 
-HOLDS = {"spring": ("constant",), LINKS: ("pendulum",)}  # a spring has its own zero
+HOLDS = {  # a spring has its own zero
+    "spring": ("constant",),
+    STIFFENING: ("spring", "constant"),
+    ANY: (STIFFENING, "spring", "constant"),
+    LINKS: ("pendulum",),
+}
+SIMPLER = {  # not held, but taken where the larger one is not needed
+    STIFFENING: ("pendulum",),
+    ANY: ("pendulum", TORQUE_LINE, TRAVEL_LINE, GEAR_LINE),
+}
 
 
 def families_held(family: str) -> tuple[str, ...]:
@@ -42,6 +52,13 @@ def families_held(family: str) -> tuple[str, ...]:
     shared = family.removesuffix(BY_RECORD)
     own = HOLDS.get(shared, ())
     return own if family == shared else (shared, *own, *(f"{other}{BY_RECORD}" for other in own))
+
+
+def simpler_families(family: str) -> tuple[str, ...]:
+    """Families that are taken in place of another where that is not needed beside them."""
+    shared = family.removesuffix(BY_RECORD)
+    more = "" if family == shared else BY_RECORD
+    return (*families_held(family), *(f"{other}{more}" for other in SIMPLER.get(shared, ())))
 
 
 @dataclass(frozen=True)
@@ -86,7 +103,7 @@ def _is_clear(new: Regression, old: Regression, asked: Asked) -> bool:
 
 
 def _is_held(law: Law, by: Law) -> bool:
-    return by.repeats.key == law.key if by.repeats is not None else law.family in families_held(by.family)
+    return by.repeats.key == law.key if by.repeats is not None else law.family in simpler_families(by.family)
 
 
 def chance(new: Regression, old: Regression, added: Sequence[Law]) -> float:

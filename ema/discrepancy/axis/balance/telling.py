@@ -9,9 +9,9 @@ import numpy as np
 from ema.core.records import Array
 from ema.discrepancy.axis.linear import in_metres
 
-from .found import Balance, Term
+from .found import Balance, Term, draw
 from .law import Law
-from .telling_records import INTERVAL, N_DRAWS, OF_BASE, SAID, by_record
+from .telling_records import INTERVAL, OF_BASE, SAID, by_record
 
 BELOW = 2.0  # deviations below zero from which a value is implausible
 SURE, CONTRADICTED = 0.9, 0.1
@@ -48,12 +48,6 @@ def describe(b: Balance, *, linear: bool) -> dict[str, Any]:
 
 def _short(x: float) -> float:
     return float(f"{x:.5g}")
-
-
-def draw(b: Balance) -> Array:
-    """Coefficients drawn from their uncertainty, shape (N_DRAWS, n)."""
-    rng = np.random.default_rng(0)
-    return rng.multivariate_normal(b.corrected.coefficients, b.corrected.covariance, N_DRAWS, method="eigh")
 
 
 def _nominal(b: Balance, name: str) -> float:

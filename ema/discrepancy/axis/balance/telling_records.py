@@ -11,9 +11,9 @@ from ema.core.records import Array
 from ema.discrepancy.axis.linear import in_metres
 
 from .agreement import Agreement
+from .found import N_DRAWS
 from .law import BY_RECORD
 
-N_DRAWS = 400
 INTERVAL = (2.5, 97.5)  # percent
 SAID = {"inertia": "inertia", "dry_friction": "dry friction", "viscous_drag": "drag"}
 OF_BASE = {"inertia": "kg m^2", "dry_friction": "N m", "viscous_drag": "N m s/rad"}
