@@ -33,6 +33,7 @@ def test_delayed_shifts_by_a_fraction():
     assert f.delayed(x, 1.59)[0] == 0.0
 
 
+@pytest.mark.slow
 def test_two_implementations_agree_within_noise(hidden, shipped_plant):
     """The project's model and an independent one give the same features but for switching noise."""
     n = 24
@@ -115,6 +116,7 @@ def test_a_plant_without_play_may_have_a_gear_that_gives(hidden, shipped_plant):
     assert found.k2 == 0.0
 
 
+@pytest.mark.slow
 def test_drag_and_friction_at_the_user_do_not_hide_its_resonance(hidden, shipped_plant):
     """What the user loses to the fixed world is no damping of the gear: asked for that alone, nothing was found."""
     flaws = hidden.Flaws(compliance=2.5e-5, user_inertia=0.15, user_damping=8.0, user_drag=10.0, user_rubbing=1.0)

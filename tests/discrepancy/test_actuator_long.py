@@ -19,6 +19,7 @@ def record(cycles):
     return [Record(tuple(Cycle(number, channels) for number, channels in enumerate(cycles)))]
 
 
+@pytest.mark.slow
 def test_noise_is_the_same_however_many_cycles_there_are(hidden, shipped_plant):
     """With five runs of each of thirty cycles the truth had left 1.5 times what noise was said to make."""
     cycles = hidden.cycles(hidden.Flaws(**TRUTH), 6, 11, hidden.MOTIONS[:1])

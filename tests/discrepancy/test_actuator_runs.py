@@ -31,6 +31,7 @@ def data(hidden, shipped_plant):
     )
 
 
+@pytest.mark.slow
 def test_runs_do_not_depend_on_what_shares_their_batches(shipped_plant, data):
     together = EmaPlant(shipped_plant, data, 2).repeated(POINTS, [0, 1], 4, 50)
     for point, of in zip(POINTS, together, strict=True):

@@ -108,6 +108,7 @@ def test_a_pendulum_and_friction_that_grows_with_load_are_named_under_a_position
     assert found["explained"]["fitted"] < 0.5 < 0.99 < found["explained"]["with_laws"]
 
 
+@pytest.mark.slow
 def test_free_runs_name_what_the_balance_shows_and_the_model_is_extended_by_it(positioner):
     bench = positioner.Servo(by_load=0.25)
     plant = AxisPlant(RotaryAxis.model_validate(positioner.servo_plant(bench)), [positioner.servo(bench, 1)])

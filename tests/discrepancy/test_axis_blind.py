@@ -27,6 +27,7 @@ def test_nothing_hidden_is_adequate(axis_bench, hidden_axis, seed):
     assert outcome.effects == []
 
 
+@pytest.mark.slow
 def test_friction_in_a_side_minimum_is_fitted_again_and_nothing_is_named(axis_bench, hidden_axis):
     """One window in which the axis nearly comes to rest had been a spring of 1e-6 N m/rad, or eighteen others."""
     bench, plant_file, motions = hidden_axis.drawn(280)
@@ -46,6 +47,7 @@ def test_more_friction_is_fitted_and_not_called_an_effect(axis_bench, hidden_axi
     assert outcome.k_after[0] == pytest.approx(bench.F_d, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [np.tanh, lambda x: np.clip(x, -1.0, 1.0)], ids=["rounded", "straight"])
 def test_drop_that_fades_at_small_currents_brings_no_second_cause(axis_bench, hidden_axis, shape):
     """With a hard drop it had been a smaller one with, perhaps, a change of resistance."""

@@ -36,6 +36,7 @@ def off(q, truth):
     return abs(q["value"] - truth) / (0.5 * (q["high"] - q["low"]))
 
 
+@pytest.mark.slow
 def test_rigid_body_terms_of_both_joints_are_those_of_the_arm(arm):
     found, truth, plants = arm()
     for name in ("shoulder", "elbow"):

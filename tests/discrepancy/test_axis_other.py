@@ -34,6 +34,7 @@ def look_at(axis_other, setup, *, angles=None, fitted=(), **hidden):
     return examine_ways(AxisPlant(plant, [with_angles(record, angles) if angles else record]))
 
 
+@pytest.mark.slow
 def test_a_stage_with_nothing_hidden_is_adequate_though_its_encoder_counts(axis_other):
     outcome = look(axis_other, "stage")
     assert outcome.verdict == "adequate"
@@ -47,6 +48,7 @@ def test_a_speed_that_repeats_the_encoder_is_no_channel_of_its_own(axis_other):
     assert plant.benches[0].noise["theta_m"].sigma == pytest.approx(setup.counts / 12**0.5, rel=0.05)
 
 
+@pytest.mark.slow
 def test_drag_of_a_force_driven_mass_is_named_from_its_position_alone(axis_other):
     found = look(axis_other, "stage", VISCOUS=10.0).effects[0]
     assert found["name"] == "viscous_drag"
@@ -54,6 +56,7 @@ def test_drag_of_a_force_driven_mass_is_named_from_its_position_alone(axis_other
     assert found["parameters"]["coefficient"]["value"] == pytest.approx(10.0, rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["stage", "slow"])
 def test_a_drive_that_is_held_between_samples_is_a_condition_and_no_late_sensor(axis_other, name):
     outcome = look(axis_other, name, held=True)
@@ -62,6 +65,7 @@ def test_a_drive_that_is_held_between_samples_is_a_condition_and_no_late_sensor(
     assert any("held until the next" in note for note in outcome.notes)
 
 
+@pytest.mark.slow
 def test_an_effect_far_above_the_noise_does_not_hide_that_the_drive_is_held(axis_other):
     outcome = look(axis_other, "stage", held=True, VISCOUS=10.0)
     assert [e["name"] for e in outcome.effects] == ["viscous_drag"]
@@ -69,6 +73,7 @@ def test_an_effect_far_above_the_noise_does_not_hide_that_the_drive_is_held(axis
     assert any("held until the next" in note for note in outcome.notes)
 
 
+@pytest.mark.slow
 def test_what_pulls_once_per_turn_may_be_a_weight(axis_other):
     """A weight and a magnet that pulls once per turn are one law of the angle."""
     found = look(axis_other, "voltage", COGGING=0.02, ORDER=1.0).effects[0]
@@ -77,6 +82,7 @@ def test_what_pulls_once_per_turn_may_be_a_weight(axis_other):
     assert "unbalanced load" in found["sentence"]
 
 
+@pytest.mark.slow
 def test_a_constant_force_is_one_with_unequal_friction_and_with_an_offset_of_the_force_sensor(axis_other):
     found = look(axis_other, "stage", CONSTANT=1.5).effects[0]
     names = {found["name"], *found["indistinguishable_from"]}
@@ -84,6 +90,7 @@ def test_a_constant_force_is_one_with_unequal_friction_and_with_an_offset_of_the
     assert found["confidence"] < 0.9
 
 
+@pytest.mark.slow
 def test_a_drive_that_gives_more_one_way_than_the_other_is_named(axis_other):
     """Force + 0.1 |force|; the effect is what opposes the motion."""
     (found,) = look(axis_other, "stage", EVEN=0.1).effects
@@ -93,6 +100,7 @@ def test_a_drive_that_gives_more_one_way_than_the_other_is_named(axis_other):
     assert "a part of -0.1 times the size of the force" in found["sentence"]
 
 
+@pytest.mark.slow
 def test_friction_that_falls_fast_with_speed_is_named_though_motion_cannot_be_foretold_for_long(axis_other):
     """Deviations grow thirtyfold in a tenth of a second; windows of 0.4 s and a start elsewhere had missed it."""
     setup = replace(axis_other.BASE, inertia=8e-5, F_d=0.028, F_s=0.045, w_stribeck=7.0, motions=SLOW)
@@ -105,6 +113,7 @@ def test_friction_that_falls_fast_with_speed_is_named_though_motion_cannot_be_fo
 SLOW = ((12, 0.5, 0), (30, 1.3, 0), (25, 0.7, -12))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("own", "name"), [(True, "encoder_error"), (False, "resolver_error")])
 def test_an_angle_sensor_off_centre_is_told_with_or_without_a_speed_sensor_of_its_own(axis_other, own, name):
     setup = axis_other.BASE if own else replace(axis_other.SETUPS["encoder"], counts=0.0)
@@ -127,6 +136,7 @@ def test_turns_that_were_counted_are_no_torque(axis_other):
     np.testing.assert_allclose(a.y, b.y, atol=0.02 * float(a.sigma.min()))
 
 
+@pytest.mark.slow
 def test_a_mass_that_swings_on_its_spring_needs_little_force_and_shows_all_of_the_spring(axis_other):
     setup = replace(
         axis_other.SETUPS["stage"], inertia=0.5, F_d=0.3, F_s=0.3, C=0.5, gains=(0.0, 3.0), motions=AT_RESONANCE
@@ -141,6 +151,7 @@ def test_a_mass_that_swings_on_its_spring_needs_little_force_and_shows_all_of_th
 AT_RESONANCE = ((0.3, 4.3, 0), (0.5, 4.0, 0), (0.4, 5.0, 0), (0.3, 3.6, 0))
 
 
+@pytest.mark.slow
 def test_noise_that_is_a_little_more_than_declared_is_no_cause(axis_other):
     setup = axis_other.BASE
     declared = {"theta_m": 0.94 * 2e-4, "w_m": 0.94 * 0.05, "i_q": 0.94 * 5e-3, "u_q": 0.94 * 0.02}

@@ -36,6 +36,7 @@ def test_how_often_a_speed_loop_acts_is_no_heavier_axis(servo, samples):
     assert (ACTS_BETWEEN in outcome.notes) == (not samples)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [True, False])
 def test_a_heavier_axis_is_named_and_its_interval_holds_the_truth(servo, samples):
     outcome = look(servo, servo.SPEED_LOOP, samples=samples, inertia=1.05 * 0.0085)
@@ -44,12 +45,14 @@ def test_a_heavier_axis_is_named_and_its_interval_holds_the_truth(servo, samples
     assert change["low"] - 1e-3 <= 0.05 <= change["high"] + 1e-3
 
 
+@pytest.mark.slow
 def test_a_motor_that_saturates_is_not_taken_for_a_drive_that_is_held(servo):
     outcome = look(servo, servo.CURRENT, position=True, i_sat=2.5, seconds=4.0)
     assert "saturation" in [e["name"] for e in outcome.effects]
     assert not any("between samples" in note for note in outcome.notes)
 
 
+@pytest.mark.slow
 def test_a_drive_with_a_clock_of_its_own_adds_up_to_a_delay(servo):
     (cycle,) = servo.record(1, position=True, seconds=6.0)
     t, i_q = cycle["t"], cycle["i_q"]

@@ -36,6 +36,7 @@ def full():
     return Findings("explained", [spring], gain, posterior=posterior, next_recording=nxt, rejected=lost)
 
 
+@pytest.mark.slow
 def test_sets_and_what_would_tell_them_apart_are_shown(full, tmp_path):
     page = tmp_path / "report.html"
     write_report(page, "bench", ["flight.csv"], full, [])

@@ -172,6 +172,7 @@ def test_without_noise_nothing_is_given_back():
     assert corrected.coefficients[0] == pytest.approx(model.coefficients[0], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_report_of_an_axis_shows_each_record_and_what_the_model_lacks():
     plant = on_paper.plant(on_paper.cycle(), on_paper.cycle(seed=2))
     outcome = SimpleNamespace(base=["F_d"], k_before=[2.0 * on_paper.F_D], point={"F_d": on_paper.F_D})

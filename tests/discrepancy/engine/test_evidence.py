@@ -88,6 +88,7 @@ def _drawn_toys(toys):
         yield truth, posterior(log_z, 0.0)
 
 
+@pytest.mark.slow
 def test_what_is_said_with_probability_p_is_right_p_of_the_time(toys):
     """The reliability diagram, of every set's probability, where the prior is what was drawn from."""
     said, right = [], []

@@ -181,6 +181,7 @@ def test_lines_above_the_titles_and_an_old_encoding_are_told(tmp_path):
     assert record.cycles[0]["i_q"][1] == 0.21
 
 
+@pytest.mark.slow
 def test_a_map_of_torque_over_angle_is_readings_at_rest(tmp_path):
     path = tmp_path / "map.txt"
     up = np.arange(0.0, 360.0, 0.5)
