@@ -15,6 +15,9 @@ from ema.models.axis_config import RotaryAxis
 SMALL = geared.Axis(J=1.1e-5, F=7e-3, C=4.7e-6, k_t=0.0125)
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def outcome():
     """A torque that reads 15 % too much, held between its samples; that of a heavier axis is straight and as good."""
@@ -26,7 +29,6 @@ def outcome():
     return examine_ways(AxisPlant(model, [Record((Cycle(0, channels),))], n_threads=1))
 
 
-@pytest.mark.slow
 def test_a_torque_that_reads_too_much_is_no_heavier_axis(outcome):
     told = {name for e in outcome.effects for name in (e["name"], *e["indistinguishable_from"])}
     assert "drive_gain" in told
