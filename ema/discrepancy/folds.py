@@ -91,9 +91,10 @@ class Folds:
 
     def sentence(self, scale: float, unit: str) -> str:
         """The gain with its error, in words."""
-        gain, error = (f"{scale * x:.3g}" for x in (self.gain, self.gain_error))
+        gain, error = (f"{scale * abs(x):.3g}" for x in (self.gain, self.gain_error))
+        how = "better" if self.gain >= 0.0 else "worse"
         return (
-            f"Held out one by one, {len(self.names)} parts are foretold better by {gain} ± {error} {unit}; "
+            f"Held out one by one, {len(self.names)} parts are foretold {how} by {gain} ± {error} {unit}; "
             f"what is left is {self.told_rest} times what noise makes of it."
         )
 

@@ -51,3 +51,8 @@ def test_every_part_is_left_out_once_and_neighbours_are_apart():
     assert len(groups) == 8
     assert all(b - a > 1 for g in groups for a, b in itertools.pairwise(g))
     assert deal([4, 5], 8) == [[4], [5]]
+
+
+def test_a_loss_is_told_as_one():
+    assert "foretold better by 0.02 " in folds([0.01, 0.01], [0.03, 0.03]).sentence(1.0, "A")
+    assert "foretold worse by 0.02 " in folds([0.05, 0.05], [0.03, 0.03]).sentence(1.0, "A")
