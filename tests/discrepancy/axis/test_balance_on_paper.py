@@ -83,6 +83,25 @@ def test_nothing_is_chosen_where_nothing_acts_and_a_drag_where_one_does():
     assert term.wins > 0.95
 
 
+@pytest.mark.parametrize("between", [0.0, 0.25, 0.5])
+def test_a_line_along_a_travel_may_lie_between_those_that_are_tried(between):
+    """Magnets of a linear motor: no whole number of them fits into a travel."""
+    m = motion()
+    resolution = 2.0 * np.pi / float(np.ptp(m.theta))
+    order = (9.0 + between) * resolution
+    made = rows(m, torque=0.05 * np.sin(order * m.theta + 1.0), noise=0.005)
+    (term,) = choose_laws(made, PLAIN, list(laws(m, linear=True))).terms
+    found = term.law.values(made_of(made, term.law))
+    assert term.law.name == "position_line"
+    assert found["order"] == pytest.approx(order, abs=resolution / 40.0)
+    assert found["amplitude"] == pytest.approx(0.05, rel=0.05)
+
+
+def made_of(made, law):
+    model = regress(made, PLAIN, [law])
+    return model.coefficients[model.part(law)]
+
+
 def test_a_law_by_record_is_the_shared_one_cut_in_two():
     m = motion()
     shared = Law("f", "f", "f", lambda m, _: (m.w**2,), {"c": "1"}, one("c"), "{c}", "")

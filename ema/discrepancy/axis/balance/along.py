@@ -219,15 +219,34 @@ def _lines(span: float, u: Units, *, linear: bool, but: tuple[float, ...]) -> It
     for n in np.arange(lowest, min(HIGHEST_ORDER * step, lowest + step * N_ORDERS), step):
         if n in but:
             continue  # stands among the gear's
-        periods = f"once in {2.0 * np.pi / n:.3g} m of travel" if linear else "with {order:.4g} periods per turn"
-        yield Law(
-            TRAVEL_LINE if linear else TORQUE_LINE,
-            f"line {n:.5g}",
-            "position_line" if linear else "cogging",
-            _line(float(n)),
-            {"amplitude": u.torque, "order": "rad/m" if linear else "1/turn", "phase": "rad"},
-            _of_line(float(n)),
-            f"a {u.said} of {{amplitude:.3g}} {u.torque} {periods}",
-            "slow motion over the whole travel" if linear else "slow motion over a full turn, with the drive off",
-            n_columns=2,
-        )
+        yield _line_along(float(n), step, u) if linear else _line_of_a_turn(float(n), u)
+
+
+def _line_of_a_turn(n: float, u: Units) -> Law:
+    return Law(
+        TORQUE_LINE,
+        f"line {n:.5g}",
+        "cogging",
+        _line(n),
+        {"amplitude": u.torque, "order": "1/turn", "phase": "rad"},
+        _of_line(n),
+        f"a {u.said} of {{amplitude:.3g}} {u.torque} with {{order:.4g}} periods per turn",
+        "slow motion over a full turn, with the drive off",
+        n_columns=2,
+    )
+
+
+def _line_along(n: float, step: float, u: Units) -> Law:
+    """No order is whole along a travel: lines stand for all that lie between them, `step` [rad/m] apart."""
+    return Law(
+        TRAVEL_LINE,
+        f"line {n:.8g}",
+        "position_line",
+        _line(n),
+        {"amplitude": u.torque, "order": "rad/m", "phase": "rad"},
+        _of_line(n),
+        f"a {u.said} of {{amplitude:.3g}} {u.torque} once in {2.0 * np.pi / n:.4g} m of travel",
+        "slow motion over the whole travel",
+        n_columns=2,
+        finer=lambda share: [_line_along(n + side * share * step, step, u) for side in (-1.0, 1.0)],
+    )

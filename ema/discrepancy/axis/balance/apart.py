@@ -60,6 +60,7 @@ def by_record(law: Law, n_records: int) -> Law:
         sentence="on average of the records, and another in each: " + law.sentence,
         n_columns=n_records * law.n_columns,
         repeats=law,
+        finer=None,
     )
 
 

@@ -18,6 +18,7 @@ from .rows import Rows
 MOST_LAWS = 8  # a series of lines is one
 MOST_LINES = 16  # of one series: each takes a tenth at least of what those before it left
 SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
+N_FINER = 5  # times that the step between members of a family is halved
 N_DRAWS = 400  # of blocks, to see how often a law wins
 
 
@@ -92,7 +93,15 @@ def _add(model: Regression, law: Law) -> list[Law]:
 
 
 def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
-    """The member of a family whose columns take most of what is left."""
+    """The member of a family whose columns take most of what is left, or one that lies between two members."""
+    best = _best_of(found, model, members)
+    for k in range(1, N_FINER + 1):
+        if best.finer is not None:
+            best = _best_of(found, model, [best, *best.finer(0.5**k)])
+    return best
+
+
+def _best_of(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
     if len(members) == 1:
         return members[0]
     q, _ = np.linalg.qr(model.design)

@@ -57,6 +57,8 @@ class Law:
         Where a column is f + dp/dt: f and p, so that no derivative of p is taken.
     repeats : Law or None
         The law of which it has the columns once for each record.
+    finer : function share → laws
+        Of a family whose members stand for all between them: those that lie this share of a step to both sides.
     """
 
     family: str
@@ -73,6 +75,7 @@ class Law:
     n_columns: int = 1
     repeats: Law | None = None
     weak: Callable[[Motion], Sequence[tuple[Array, Array]]] | None = None
+    finer: Callable[[float], Sequence[Law]] | None = None
 
 
 def one(name: str, **shape: float) -> Values:
