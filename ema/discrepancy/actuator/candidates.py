@@ -221,20 +221,23 @@ def candidates(
     torques: Sequence[Torque],
     line: str = "cogging",
     gear: Resonance | None = None,
+    delays: Mapping[str, float] | None = None,
 ) -> list[Candidate]:
     """What to try on these cycles: what effects declare, and what the record or the residual torque suggests.
 
     A torque line is tried as the effect `line`: the first is cogging, a further one stands beside it. `gear` is the
-    resonance that rotor and user show.
+    resonance that rotor and user show, `delays` what they show of effects that are late. [s]
     """
+    delays = delays or {}
     shown = {"", *(["supply"] if all(s.u_dc is not None for s in data.signals) else [])}
     shown |= {"warming"} if np.ptp(data.dT) > WARMER else set()
     found = [
         _plain(effect.name, *look.linear, step=look.steps, **look.at)
         for effect in registry().values()
         for look in effect.looks
-        if look.needs in shown
+        if look.needs in shown and effect.name not in delays
     ]
+    found += [Seen(**vars(replace(_plain(name, "time"), steps=(late,)))) for name, late in delays.items()]
     found += [_commutation(plant, data.zero), _without_filter()]
     top = max(float(np.abs(s.i).max()) for s in data.signals)
     if any(int((np.abs(s.i) > top - FLAT).sum()) >= FLAT_SAMPLES for s in data.signals):

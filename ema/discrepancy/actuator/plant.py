@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from ema.models import hf
 from ema.models.actuator import Actuator
 from ema.models.layout import STATE
 
+from .delays import see_delays
 from .features import Signals, features, floors, slices, stacked
 from .gear import Resonance
 from .measured import Measured
@@ -66,6 +68,11 @@ class EmaPlant:
         if trusted is not None:
             for floor, of in zip(self.floors, supply, strict=True):
                 floor[of] = trusted
+
+    @cached_property
+    def delays(self) -> dict[str, float]:
+        """Delays that the record shows, by effect. [s]"""
+        return see_delays(self.plant, self.data)
 
     def neutral(self, name: str) -> float:
         """Value of a parameter that a point does not name: the plant file's own, or neutral."""

@@ -41,7 +41,8 @@ class Screened(NamedTuple):
 def rank_to_first_order(search: Search, model: Model) -> list[Screened]:
     """All that may stand beside the effects of `model`, by what it promises to first order."""
     line = "torque_line" if "cogging" in model.names else "cogging"
-    found = candidates(search.plant.plant, search.plant.data, search.torques(model), line, search.plant.resonance)
+    plant = search.plant
+    found = candidates(plant.plant, plant.data, search.torques(model), line, plant.resonance, plant.delays)
     return _rank(search, model, [c for c in found if c.effect not in model.names])
 
 
