@@ -109,6 +109,23 @@ def delayed(t, x, k, delay, slope):
 
 
 @njit(inline="always")
+def delayed_position(t, theta, w, k, delay, slope, skew):
+    """Position at t[k] - delay by the cubic with the speeds; before the first sample under its acceleration `slope`."""
+    at = t[k] - delay
+    if at <= t[0]:
+        s = (at - t[0]) * skew
+        return theta[0] + (w[0] + 0.5 * slope * s) * s
+    j = k
+    while t[j] > at:
+        j -= 1
+    if j >= k:
+        return theta[k]
+    way, h = theta[j + 1] - theta[j], (t[j + 1] - t[j]) * skew
+    x = (at - t[j]) * skew / h
+    return theta[j] + x * way + x * (1.0 - x) * ((1.0 - x) * (h * w[j] - way) - x * (h * w[j + 1] - way))
+
+
+@njit(inline="always")
 def current_after(i, e, R, L, h):
     """Current a time `h` later under a constant voltage, exactly.    L di/dt = e - R i   [A]"""
     x = h * R / L
@@ -291,8 +308,9 @@ def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
         u = R_now * i + z[L] * inductance_factor(z, 0, 1, i) * di + k_e * out[1, k] + lost(z, i)
         out[3, k] = _commanded(u, i, z[SAG], z[V_DC]) if z[SAG] > 0.0 else u
     for k in range(n - 1, -1, -1):  # backwards, since the undelayed values of earlier samples are still needed
-        w0 = out[1, 0]
-        theta = delayed(t, out[0], k, z[POSITION_DELAY], w0) if z[POSITION_DELAY] > 0.0 else out[0, k]
+        theta = out[0, k]
+        if z[POSITION_DELAY] > 0.0:
+            theta = delayed_position(t, out[0], out[1], k, z[POSITION_DELAY], slope, skew)
         w = delayed(t, out[1], k, z[SPEED_DELAY], slope) if z[SPEED_DELAY] > 0.0 else out[1, k]
         out[0, k] = theta + angle_error(z, 0, 1, theta) + position_error(z, 0, 1, theta)
         out[1, k] = w * (1.0 + _slope(z, theta, False))

@@ -154,6 +154,14 @@ def test_the_load_follows_a_recorded_motion_through_the_gear():
     assert w_l == pytest.approx((1j * slow * swing).real, abs=2e-3 * slow)
 
 
+def test_a_late_position_is_where_the_axis_was_between_samples_and_before_the_first():
+    """Under a constant acceleration: straight lines between samples are 0.13 mrad off, and 3.6 before the first."""
+    a, late = 0.05 * 0.4 / 2e-5, 2.7e-3
+    out = run(FREE, "current", np.full(len(T), 0.4), effects={"position_delay": {"time": late}}, start=(0.2, -30.0))
+    then = T - late
+    np.testing.assert_allclose(out[0], 0.2 - 30.0 * then + 0.5 * a * then**2, atol=1e-9)
+
+
 def test_a_load_of_which_nothing_is_known_before_moves_as_its_motor_does():
     numbers = axis.model(FREE, {"gear_compliance": GEAR["gear_compliance"]})
     t = np.arange(0.0, 0.01, 1e-3)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +10,7 @@ from ema.core.records import Array
 from .whitening import Filter, join
 from .windows import Bench, Window
 
+History = tuple[NDArray[np.int64], Array, Array, Array, NDArray[np.bool_]]
 MEMORY = 1.0  # [s] for which a load behind a gear is followed before a window
 
 
@@ -31,26 +30,33 @@ class Pack:
         directions = [w.direction for w in windows if w.direction is not None]
         self.direction = np.concatenate(directions) if directions else None
         self.filter = join(filters) if filters else None
+        self._histories: dict[float, History] = {}  # the last one asked for
 
     def drive_by(self, clock: float) -> Array:
         """The drive at the samples of the motion, where it has a clock of its own."""
         return self.drive if clock == 0.0 else np.concatenate([w.drive_by(clock) for w in self.windows])
 
-    @cached_property
-    def history(self) -> tuple[NDArray[np.int64], Array, Array, Array, NDArray[np.bool_]]:
-        """Recorded motion before each window since the one before it.
+    def history(self, late: float = 0.0) -> History:
+        """Motion before each window since the one before it, of a position that is recorded `late`. [s]
 
         Offsets, time, position, speed, and whether it follows.
         """
+        if late not in self._histories:
+            self._histories = {late: self._history(late)}
+        return self._histories[late]
+
+    def _history(self, late: float) -> History:
         parts, follows = [], []
-        last: tuple[int, int] | None = None
+        chain, last = -1, 0.0
         for w in self.windows:
-            t = w.before[0]
-            first = max(0, int(np.searchsorted(t, t[-1] - MEMORY)))
-            follows.append(last is not None and last[0] == w.chain and first < last[1] <= len(t))
-            first = last[1] - 1 if follows[-1] and last is not None else first
-            parts.append(tuple(x[first:] for x in w.before))
-            last = (w.chain, len(t))
+            t, theta, speed = w.around
+            end = min(w.t[0] + late, t[-1])
+            first = max(end - MEMORY, t[0])
+            follows.append(chain == w.chain and first <= last <= end)
+            at = np.array([last if follows[-1] else first, end])
+            at = np.unique(np.concatenate((at, t[(t > at[0]) & (t < end)])))
+            parts.append((at, np.interp(at, t, theta), np.interp(at, t, speed)))
+            chain, last = w.chain, end
         offsets = np.concatenate(([0], np.cumsum([len(t) for t, *_ in parts]))).astype(np.int64)
         t, theta, speed = (np.concatenate(column) for column in zip(*parts, strict=True))
         return offsets, t, theta, speed, np.array(follows)

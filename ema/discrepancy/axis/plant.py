@@ -272,10 +272,9 @@ class AxisPlant:
         for place, w in enumerate(pack.windows):
             starts[place, 0] = w.position[0] if late_theta == 0.0 else np.interp(w.t[0] + late_theta, w.t, w.position)
             starts[place, 1] = w.speed[0] if late_w == 0.0 else np.interp(w.t[0] + late_w, w.t, w.speed)
-        starts[:, :2] = axis.true_state(model, starts[:, :2], derived=pack.bench.roles.speed is None)
         if axis.is_flexible(model):
-            motor = np.array([(w.position[0], w.speed[0]) for w in pack.windows])
-            starts[:, 2:] = motor - axis.loads_after(model, *pack.history, step)
+            starts[:, 2:] = starts[:, :2] - axis.loads_after(model, *pack.history(late_theta), step)
+        starts[:, :2] = axis.true_state(model, starts[:, :2], derived=pack.bench.roles.speed is None)
         return starts
 
     def _bristles(self, pack: Pack, model: axis.Model) -> Array | None:
@@ -283,7 +282,7 @@ class AxisPlant:
         if not axis.has_memory(model):
             return None
         play = NOISE * position_noise(pack.bench, pack.windows[0])
-        return axis.bristles_after(model, *pack.history, play)
+        return axis.bristles_after(model, *pack.history(model.z[row("position_delay.time")]), play)
 
     def main_row(self, block: int) -> int:
         """Row of the output that is shown and whose error is reported."""

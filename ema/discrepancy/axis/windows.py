@@ -33,8 +33,8 @@ class Window:
     """Consecutive samples of one cycle, in arrays of shape (n_times,).
 
     `outputs` has one row per output channel of its record. `position`, `speed` are smooth; `static` windows hold
-    samples at rest with the `direction` of approach. `before` is time, position as recorded and smooth speed, from the
-    last gap (whose number is `chain`) up to the first sample. `course` is time and drive of the whole cycle.
+    samples at rest with the `direction` of approach. `around` is time, position as recorded and smooth speed from
+    gap to gap (`chain` is the number of that part). `course` is time and drive of the whole cycle.
     """
 
     group: str
@@ -48,7 +48,7 @@ class Window:
     static: bool = False
     direction: Array | None = None
     stretch: int = 0
-    before: tuple[Array, Array, Array] = (np.empty(0), np.empty(0), np.empty(0))
+    around: tuple[Array, Array, Array] = (np.empty(0), np.empty(0), np.empty(0))
     course: tuple[Array, Array] = (np.empty(0), np.empty(0))
     chain: int = 0
 
@@ -153,11 +153,11 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
                 columns = (t[rows], cycle[who.drive][rows], outputs, smooth[rows], speed[rows])
                 dT = float(np.mean(warmer[rows]))
                 gap = max(gap for gap in (0, *gaps.tolist()) if gap <= part[0])
-                upto = slice(gap, int(part[0]) + 1)
-                before = (t[upto], raw[upto], speed[upto])
+                whole = slice(gap, min((end for end in gaps.tolist() if end > part[0]), default=n))
+                around = (t[whole], raw[whole], speed[whole])
                 course, chain = (t, cycle[who.drive]), cycle.number * 1_000_000 + gap
                 out.append(
-                    Window(group, label, *columns, dT, stretch=stretch, before=before, course=course, chain=chain)
+                    Window(group, label, *columns, dT, stretch=stretch, around=around, course=course, chain=chain)
                 )
     return out
 
