@@ -10,7 +10,7 @@ from scipy.ndimage import maximum_filter1d
 from ema.core.records import Array
 from ema.models.axis_config import Axis
 
-from .whitening import Filter, design, open_loop_variance
+from .whitening import Filter, design, open_loop_variance, variance_without_start
 from .windows import HALF, START_NOISE, Bench, Window, speed_noise
 
 TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
@@ -129,8 +129,7 @@ def without_start(p: Axis, b: Bench, w: Window, r: Array) -> tuple[Array, Array]
     A = np.einsum("cni,cn,cnj->ij", modes[:, first], weight, modes[:, first])
     known = b.roles.position is not None
     A = A if known else A + np.diag([1.0 / position_noise(b, w) ** 2, 0.0])
-    covariance = np.linalg.inv(A)
-    start = covariance @ np.einsum("cni,cn,cn->i", modes[:, first], weight, r[:, first])
+    estimator = np.ascontiguousarray(np.einsum("ij,cnj,cn->nic", np.linalg.inv(A), modes[:, first], weight))
     out = np.empty(m.noise.shape)
-    open_loop_variance(H, m.noise, m.process, dt, covariance[np.triu_indices(2)], damping, out)
-    return r - modes @ start, out
+    variance_without_start(H, m.noise, m.process, dt, estimator, modes, damping, out)
+    return r - modes @ np.einsum("nic,cn->i", estimator, r[:, first]), out

@@ -129,3 +129,51 @@ def open_loop_variance(H, noise, process, dt, start, damping, out):
             h0, h1 = H[c, 0], H[c, 1]
             out[c, k] = h0 * h0 * p00 + 2.0 * h0 * h1 * p01 + h1 * h1 * p11 + noise[c, k] ** 2
         p00, p01, p11 = _propagate(p00, p01, p11, process[k], dt[k], damping)
+
+
+@njit(cache=True)
+def variance_without_start(H, noise, process, dt, G, modes, damping, out):
+    """Variance of r - M a, where a start state a = Σ G r of the first samples is taken off a free run's residual r.
+
+    What a has of the noise of a sample, and of what pushes the state before and after it, is in the residual too. With
+    P the state's covariance from a known start, C = Cov(a of samples so far, state), B = Σ G H Φ of later samples:
+
+    Cov(a, r) = (C + B P) Hᵀ + G σ²        Var = H P Hᵀ + σ² - 2 M Cov(a, r) + M Cov(a) Mᵀ
+
+    Parameters
+    ----------
+    G : array, shape (n_first, 2, n_channels)
+    modes : array, shape (n_channels, n_times, 2)
+        M: what a start state makes of each output.
+    """
+    n, m = noise.shape[1], G.shape[0]
+    later = np.zeros((m, 2, 2))
+    for k in range(m - 2, -1, -1):
+        ahead = later[k + 1] + G[k + 1] @ H
+        a = np.exp(-damping * dt[k])
+        b = (1.0 - a) / damping if damping > 0.0 else dt[k]
+        later[k, :, 0], later[k, :, 1] = ahead[:, 0], b * ahead[:, 0] + a * ahead[:, 1]
+    P, C, of_start = np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 2))
+    covariances = np.zeros((n, noise.shape[0], 2))
+    for k in range(n):
+        if k < m:
+            GH = G[k] @ H
+            C += GH @ P
+            pushed = C @ GH.T
+            of_start += pushed + pushed.T - GH @ P @ GH.T
+        with_state = C + later[k] @ P if k < m else C
+        for c in range(noise.shape[0]):
+            covariances[k, c] = with_state @ H[c]
+            out[c, k] = H[c] @ P @ H[c] + noise[c, k] ** 2
+            if k < m:
+                covariances[k, c] += G[k, :, c] * noise[c, k] ** 2
+                of_start += np.outer(G[k, :, c], G[k, :, c]) * noise[c, k] ** 2
+        a = np.exp(-damping * dt[k])
+        b = (1.0 - a) / damping if damping > 0.0 else dt[k]
+        p00, p01, p11 = _propagate(P[0, 0], P[0, 1], P[1, 1], process[k], dt[k], damping)
+        P[0, 0], P[0, 1], P[1, 0], P[1, 1] = p00, p01, p01, p11
+        C[:, 0], C[:, 1] = C[:, 0] + b * C[:, 1], a * C[:, 1]
+    for k in range(n):
+        for c in range(noise.shape[0]):
+            M = modes[c, k]
+            out[c, k] += M @ of_start @ M - 2.0 * (M @ covariances[k, c])
