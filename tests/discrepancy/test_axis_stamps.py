@@ -40,3 +40,13 @@ def test_an_angle_whose_noise_hides_it_says_nothing():
         examine_stamps(cycle(seed, stamped=5e-5, noise=0.01), "theta_m").samples == "as stamped" for seed in range(40)
     ]
     assert sum(wrong) <= 1
+
+
+def test_a_rate_that_drifts_is_no_jitter():
+    """Samples of a USB device that is asked more slowly as it goes: half a millisecond a step, had been 53 ms."""
+    rng = np.random.default_rng(2)
+    t = np.cumsum(np.linspace(5e-3, 5.8e-3, 1300) + 5e-4 * rng.standard_normal(1300))
+    theta = 3.0 * np.sin(4.0 * t)
+    found = examine_stamps(Cycle(0, {"t": t, "theta_m": theta}), "theta_m")
+    assert found.samples == "as stamped"
+    assert found.jitter == pytest.approx(5e-4 / np.sqrt(2.0), rel=0.2)

@@ -22,7 +22,10 @@ GAP = 5.0  # periods that are no jitter
 
 @dataclass(frozen=True)
 class Stamps:
-    """Of one cycle: rms by which stamps differ from even times [s], and which the motion is smoother over."""
+    """Of one cycle: rms by which stamps differ from even times [s], and which the motion is smoother over.
+
+    By how steps vary from one to the next: a rate that drifts adds up to far more, and is no jitter.
+    """
 
     jitter: float
     samples: str  # "as stamped", "even" or "either"
@@ -34,10 +37,10 @@ def examine_stamps(cycle: Cycle, channel: str) -> Stamps:
     step = np.diff(t)
     period = float(np.median(step))
     if len(t) < 4 * HALF * BLOCKS or float(step.max()) > GAP * period or float(np.std(step)) < VARIES * period:
-        return Stamps(float(np.std(step)) if len(step) else 0.0, "either")
+        return Stamps(0.0, "either")
     n = np.arange(len(t))
     even = np.asarray(np.polyval(np.polyfit(n, t, 1), n), np.float64)
-    jitter = float(np.std(t - even))
+    jitter = float(np.std(step)) / np.sqrt(2.0)
     more = np.log(_roughness(t, x) / _roughness(even, x))
     spread = float(np.std(more)) / np.sqrt(BLOCKS)
     mean = float(np.mean(more))
@@ -65,5 +68,5 @@ def describe(name: str, cycles: tuple[Cycle, ...], channel: str) -> list[str]:
             "were taken evenly and stamped late or early; give them even times"
         ]
     if all(s.samples == "as stamped" for s in clear):
-        return [f"{name}: sampling times vary by {jitter:.2g} s rms, as they are stamped; they are taken as they are"]
+        return [f"{name}: sampling times vary by {jitter:.2g} s rms from step to step, as stamped; they are taken as they are"]
     return []
