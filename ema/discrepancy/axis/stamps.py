@@ -68,5 +68,7 @@ def describe(name: str, cycles: tuple[Cycle, ...], channel: str) -> list[str]:
             "were taken evenly and stamped late or early; give them even times"
         ]
     if all(s.samples == "as stamped" for s in clear):
-        return [f"{name}: sampling times vary by {jitter:.2g} s rms from step to step, as stamped; they are taken as they are"]
+        return [
+            f"{name}: sampling times vary by {jitter:.2g} s rms from step to step; they are taken as they are stamped"
+        ]
     return []
