@@ -102,7 +102,8 @@ def sentences(balance: dict[str, Any]) -> list[str]:
     share = balance["explained"]
     base = ", ".join(_number(SAID[name], q) for name, q in balance["base"].items())
     base += "".join(f", and {law['sentence']}," for law in balance.get("given", ()))
-    out = [f"Balance of {what} along the measured motion: {base} explain {share['fitted']:.1%} of the drive's {what}"]
+    alone = f"{share['fitted']:.1%}" if share["fitted"] > 0.0 else "none"
+    out = [f"Balance of {what} along the measured motion: {base} explain {alone} of the drive's {what}"]
     if balance["terms"]:
         found = "; ".join(_said(term) for term in balance["terms"])
         out[0] += f"; with {len(balance['terms'])} more, {_close(share['with_laws'])}: {found}"
