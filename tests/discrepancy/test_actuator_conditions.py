@@ -40,6 +40,12 @@ def test_a_record_of_the_plant_changes_nothing(cycles, shipped_plant):
     assert notes == []
 
 
+def test_a_third_more_noise_on_the_user_is_no_rest_for_a_balance_to_see(hidden, shipped_plant):
+    noisy = hidden.cycles(hidden.Flaws(), 2, 11, bench=hidden.Bench(lvdt_noise=5.3e-6))
+    plant, _ = take_recorded_conditions(shipped_plant, prepared(shipped_plant, noisy).signals)
+    assert plant.sensors.lvdt_noise == pytest.approx(5.3e-6, rel=0.1)
+
+
 @pytest.mark.parametrize("sd", [0.02, 0.05])
 def test_noise_of_the_current_sensors_is_read_from_their_sum(cycles, shipped_plant, sd):
     rng = np.random.default_rng(1)

@@ -16,7 +16,7 @@ from ema.models.actuator import Actuator
 
 from .features import Signals, local_mean, motor_torque, roughness
 
-WITHIN = 1.3  # factor by which noise may differ from the plant file's before it is replaced
+WITHIN = 1.1  # factor by which noise may differ from the plant file's before it is replaced: what a record tells of it
 SMOOTH = 101  # samples over which a user position is taken as straight but for noise
 SUPPLY_MEAN = 5e-3  # [s]
 SUPPLY_TOLERANCE = 2e-3  # of the plant file's voltage
