@@ -10,18 +10,28 @@ from .base import POSITIVE, Effect, Parameter
 
 @njit(inline="always")
 def bends(x, growth):
-    """Torque whose slope grows from 0 in the middle, x = 0, to 1 at both ends, -1 and 1: for little growth a cube"""
-    return (np.sinh(growth * x) / growth - x) / (np.cosh(growth) - 1.0)
+    """Torque whose slope grows from 0 in the middle, x = 0, to 1 at both ends, -1 and 1: for little growth a cube.
+
+    Beyond the ends it goes on straight.
+    """
+    inside = np.minimum(np.maximum(x, -1.0), 1.0)
+    return (np.sinh(growth * inside) / growth - inside) / (np.cosh(growth) - 1.0) + x - inside
 
 
 @njit(inline="always")
 def tilts(x, growth):
-    """Torque whose slope is -1 at the lower end, 0 in the middle, 1 at the upper end: for little growth a square"""
-    return (np.cosh(growth * x) - 1.0) / (growth * np.sinh(growth))
+    """Torque whose slope is -1 at the lower end, 0 in the middle, 1 at the upper end: for little growth a square.
+
+    Beyond the ends it goes on straight.
+    """
+    inside = np.minimum(np.maximum(x, -1.0), 1.0)
+    return (np.cosh(growth * inside) - 1.0) / (growth * np.sinh(growth)) + np.abs(x - inside)
 
 
 def torque(theta_m, w_m, theta_u, i_q, middle, lower, upper, bias, centre, half, over):
     """τ = b + ∫ k dθ from the centre; k = k_0 + k_1 cosh((θ - θ_c)/w) + k_2 sinh((θ - θ_c)/w)   [N m]"""
+    if middle == 0.0 and lower == 0.0 and upper == 0.0:  # most axes have none, and hyperbolic functions take time
+        return bias + 0.0 * theta_m
     x, growth = (theta_m - centre) / half, half / over
     bent = (0.5 * (lower + upper) - middle) * bends(x, growth)
     return bias + half * (middle * x + bent + 0.5 * (upper - lower) * tilts(x, growth))

@@ -107,3 +107,12 @@ def test_for_little_growth_it_is_a_square_and_a_cube():
     x = np.linspace(-1.0, 1.0, 11)
     assert bends(x, 0.05) == pytest.approx(x**3 / 3.0, abs=1e-4)
     assert tilts(x, 0.05) == pytest.approx(x**2 / 2.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("growth", [1e-3, 0.5, 3.0])
+def test_far_beyond_the_travel_the_spring_goes_on_straight(growth):
+    """A motor turns a thousand times while its cable was looked at on one: no number overflows there."""
+    far = np.array([-7000.0, 7000.0])
+    ends = np.array([-1.0, 1.0])
+    np.testing.assert_allclose(bends(far, growth) - bends(ends, growth), far - ends, rtol=1e-6)
+    np.testing.assert_allclose(tilts(far, growth) - tilts(ends, growth), np.abs(far) - 1.0, rtol=1e-6)
