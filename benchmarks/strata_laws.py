@@ -194,6 +194,13 @@ def _unequal(a: geared.Axis, rng: Rng) -> Hidden:
     return Hidden(replace(a, unequal=_sign(rng) * rng.uniform(0.05, 0.15)), effects=("drive_unequal",))
 
 
+def _hardening(a: geared.Axis, rng: Rng) -> Hidden:
+    """A cable that pulls with the cube of the angle too: two to four times as stiff at the ends, some 10 rad away."""
+    stiffness = a.F * rng.uniform(0.1, 0.4)  # [N m/rad]
+    cube = stiffness * rng.uniform(1.0, 3.0) / (3.0 * 10.0**2)  # [N m/rad^3]
+    return Hidden(replace(a, spring=(stiffness, cube)), effects=("stiffening_spring",))
+
+
 FILTERED = "speed_delay"
 HIDDEN: dict[str, Callable[[geared.Axis, Rng], Hidden]] = {
     "friction_memory": _memory,
@@ -214,4 +221,5 @@ HIDDEN: dict[str, Callable[[geared.Axis, Rng], Hidden]] = {
     "friction_slope": _slope("friction_slope", "dry_slope"),
     "viscous_slope": _slope("viscous_slope", "viscous_slope"),
     "drive_unequal": _unequal,
+    "hardening_spring": _hardening,
 }

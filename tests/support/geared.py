@@ -39,6 +39,7 @@ class Axis:
     by_load_square: float = 0.0  # [1/(N m)] and over its square
     dry_slope: float = 0.0  # [1/rad] of F along the travel
     viscous_slope: float = 0.0  # [1/rad] of C
+    spring: tuple[float, float] = (0.0, 0.0)  # [N m/rad], [N m/rad^3]
     unequal: float = 0.0  # share by which the drive gives more one way, and less the other
     saturation: float = 0.0  # [1/A^2] loss of the torque constant by the current's square
     lines: tuple[tuple[float, float, float], ...] = ()  # amplitude [N m], order per motor turn, phase
@@ -52,7 +53,7 @@ class Axis:
 def _run(reference, hz, p, of_load, along, warm, lines, loop, out):
     J, F, C, k_t, bristle, dry_k, activation, dry_rate, viscous_rate, by_square, flux, unequal, saturation = p
     gravity, by_load, by_load_square = of_load
-    dry_slope, viscous_slope = along
+    dry_slope, viscous_slope, stiffness, hardens = along
     K_p, K_w = loop
     theta, w, z = reference[0], 0.0, 0.0
     dt = 1.0 / (hz * FINE)
@@ -67,7 +68,7 @@ def _run(reference, hz, p, of_load, along, warm, lines, loop, out):
         for _ in range(FINE):
             motor = k_t * (1.0 + flux * (warm[k] - 20.0) + unequal * np.sign(i)) * i / (1.0 + saturation * i * i)
             load = gravity * np.sin(theta)
-            other = drag * (1.0 + viscous_slope * theta) * w + load
+            other = drag * (1.0 + viscous_slope * theta) * w + load + stiffness * theta + hardens * theta**3
             for n in range(lines.shape[0]):
                 other += lines[n, 0] * np.sin(lines[n, 1] * theta + lines[n, 2])
             rubs = dry * (1.0 + dry_slope * theta) + by_square * motor * motor
@@ -104,7 +105,8 @@ def record(
         *(axis.dry_rate, axis.viscous_rate, axis.by_square, axis.flux_per_kelvin, axis.unequal),
         axis.saturation,
     )
-    of_load, along = (axis.gravity, axis.by_load, axis.by_load_square), (axis.dry_slope, axis.viscous_slope)
+    of_load = (axis.gravity, axis.by_load, axis.by_load_square)
+    along = (axis.dry_slope, axis.viscous_slope, *axis.spring)
     _run(reference, axis.hz, p, of_load, along, warm, np.array(axis.lines, float).reshape(-1, 3), loop, out)
     theta, w, i = (x + s * rng.standard_normal(n) for x, s in zip(out, axis.noise, strict=True))
     channels = {"t": t, "theta_m": theta, "w_m": w, "i_q": axis.reads * i}
