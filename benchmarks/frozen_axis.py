@@ -69,6 +69,7 @@ def beside_truth(t: strata_axis.Trial, said: dict[str, Any]) -> dict[str, Any]:
 def outcome(t: strata_axis.Trial, findings: dict[str, Any]) -> str:
     """How the finder did: right, in set, wrong, missed."""
     sets = [{e["name"], *e["indistinguishable_from"]} for e in findings["effects"]]
+    sets = [s | {strata_axis.ALSO[name] for name in s & set(t.near) & set(strata_axis.ALSO)} for s in sets]
     wanted = set(t.effects)
     if not wanted and t.kind in strata_axis.OUTSIDE:
         is_near = bool(sets) and all(s & set(t.near) for s in sets)
@@ -82,7 +83,7 @@ def outcome(t: strata_axis.Trial, findings: dict[str, Any]) -> str:
         return "wrong"
     if not all(any(name in s for s in sets) for name in wanted):
         return "missed"
-    return "right" if all(len(s) == 1 for s in sets) else "in set"
+    return "right" if all(len(s - set(t.near)) == 1 for s in sets) else "in set"
 
 
 if __name__ == "__main__":

@@ -29,6 +29,8 @@ NEAR = {
     # an axis that is driven by less torque per current is as one that is heavier and has more friction
     "one_sided_driver": ("drive_unequal", "drive_gain", "magnet_flux", "inertia"),
 }  # fmt: skip
+# What is hidden as the second is the first too, where the motion shows it: that spring stiffens with its square.
+ALSO = {"stiffening_spring": "spring_load"}
 # Torque, inertia beyond that, inductance and resistance over those of tests/support/axis_bench.py.
 PLANTS = {"small": (1.0, 1.0, 1.0, 1.0), "strong": (5.0, 2.5, 3.0, 1.5), "tiny": (0.25, 0.5, 0.4, 2.0)}
 TORQUE = {("viscous_drag", "coefficient"), ("quadratic_drag", "coefficient"), ("cogging", "amplitude"),
@@ -100,7 +102,7 @@ def _bench(names: list[str], seed: int, plant: str) -> Trial:
 
     library = tuple(name for name in names if name in hidden_axis.LIBRARY)
     case = "+".join(names) or "nothing"
-    near = NEAR.get(case, ())
+    near = (*NEAR.get(case, ()), *(also for also, name in ALSO.items() if name in names))
     return Trial(case, plant, file, (record,), library, truth, near, without, dict(bench.noise))
 
 

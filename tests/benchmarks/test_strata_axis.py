@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from benchmarks import frozen, strata_axis, strata_laws
+from benchmarks import frozen, frozen_axis, strata_axis, strata_laws
 from ema.effects import registry
 
 HEAD = "a" * 40
@@ -101,3 +101,18 @@ def test_on_every_plant_a_supply_sags_by_what_is_told_beside_a_drop_of_the_conve
     assert (both["u_q"] - sag["u_q"]) @ fell / (fell @ fell) == pytest.approx(1.0, abs=0.3)
     assert all(strata_axis.nats(t, name) > 5.0 for name in t.effects)
     assert strata_axis.nats(t, "cogging") == 0.0
+
+
+def test_a_spring_that_stiffens_is_right_where_the_hidden_one_does_and_wrong_elsewhere():
+    trials = (strata_axis.drawn("one effect", n, 7) for n in range(len(strata_axis.EFFECTS)))
+    of = {t.effects: t for t in trials}
+    spring, drag = of[("spring_load",)], of[("viscous_drag",)]
+
+    def named(*names):
+        effects = [{"name": name, "indistinguishable_from": []} for name in names]
+        return {"effects": effects, "verdict": "explained"}
+
+    assert frozen_axis.outcome(spring, named("stiffening_spring")) == "right"
+    assert frozen_axis.outcome(spring, named("spring_load")) == "right"
+    assert frozen_axis.outcome(spring, named("pendulum")) == "wrong"
+    assert frozen_axis.outcome(drag, named("stiffening_spring")) == "wrong"
