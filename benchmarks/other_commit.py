@@ -1,7 +1,7 @@
 """Frozen trials by the finder of another commit, so that two finders stand beside each other on the same records.
 
     git worktree add /tmp/old ee42f01 && make -C /tmp/old env
-    python -m benchmarks.other_commit benchmarks/trials/frozen-f7dd931.jsonl --checkout /tmp/old --out var/old.jsonl
+    python -m benchmarks.other_commit benchmarks/trials/frozen-28dc0c0.jsonl --checkout /tmp/old --out var/old.jsonl
 
 Both are given what the rows' seeds draw. The other one gets it as files, a plant file and a CSV record, by its own
 command `ema discrepancy`: what a command reads and writes is all that commits have in common. Resumable, as `frozen`;
