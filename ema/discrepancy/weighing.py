@@ -6,12 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from .engine.posterior import PRIOR, Entry, p_cause, posterior, thin
+from .engine.posterior import PRIOR, Entry, log_odds, p_cause, posterior, thin
+from .grade import IN_SET
 from .selection import NEARLY_NOISE, SAME_SHARE, Tried, is_nameless, log_scores
 
-IN_SET = 0.05  # share of what is sure of a set, below which a member is none: the others are a set of 95 %
 TOLD = 1e-3  # probability from which a set is told
 
 
@@ -76,8 +74,7 @@ def weigh_sets(plain: Tried, model: Tried, rounds: Sequence[tuple[dict[str, Trie
     score = {names: float(of.sum()) for names, of in parts.items()}
     gained = max(score.values()) - score[_names(plain)]
     form = 0.5 * SAME_SHARE * gained if scale > NEARLY_NOISE else 0.0
-    prior = float(np.log(PRIOR) - np.log1p(-PRIOR))
-    evidence = {names: z + prior * len(names) for names, z in score.items()}
+    evidence = {names: z + log_odds(PRIOR) * len(names) for names, z in score.items()}
     in_place = {
         own.key: {key: t for key, t in trials.items() if not is_nameless(key, t)}
         for own, (trials, _) in zip(model.accepted, rounds, strict=True)

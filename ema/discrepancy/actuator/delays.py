@@ -19,7 +19,7 @@ import numpy as np
 from ema.core.records import Array
 from ema.models.actuator import Actuator
 
-from .features import Signals, acceleration, current_lag, dc_current, local_mean, motor_torque
+from .features import Signals, acceleration, current_lag, dc_current, delayed, local_mean, motor_torque
 from .measured import Measured
 
 LOCAL = 20  # samples to either side in a mean: switching averages out
@@ -56,7 +56,7 @@ def _late(plant: Actuator, data: Measured, balance: Balance) -> float:
 def _gap(plant: Actuator, s: Signals, late: float) -> tuple[Array, Array]:
     """Columns of a further delay, play, twist and zero (n, 4), and what the gap leaves (n,). [rad of the rotor]"""
     GR, rate = plant.transmission.GR, plant.control.rate
-    theta = _shifted(s.theta_m, late)
+    theta = delayed(s.theta_m, late)
     w = local_mean(np.gradient(theta, axis=-1), LOCAL)
     twist = acceleration(theta, LOCAL, 1.0)
     of = np.stack([-w, np.tanh(w * rate / SLOW), twist, np.ones_like(w)], axis=-1)
@@ -66,16 +66,10 @@ def _gap(plant: Actuator, s: Signals, late: float) -> tuple[Array, Array]:
 def _control(plant: Actuator, s: Signals, late: float) -> tuple[Array, Array]:
     """Columns of a further delay and an offset (n, 2), and what the control balance leaves (n,). [A]"""
     c, limit, lag = plant.control, plant.inverter.I_max, current_lag(plant) + 0.5
-    theta_u = _shifted(s.theta_u, late)
+    theta_u = delayed(s.theta_u, late)
     wanted = c.K_w * (c.K_p * (s.theta_cmd - theta_u) - np.gradient(s.theta_m, 1.0 / c.rate, axis=-1))
     felt = np.where(np.abs(wanted) < limit, c.K_w * c.K_p * np.gradient(theta_u, axis=-1), 0.0)
     i_q = dc_current(motor_torque(plant, s)[1], s.i)
-    left = local_mean(i_q - _shifted(np.clip(wanted, -limit, limit), lag), LOCAL)
-    column = local_mean(_shifted(felt, lag), LOCAL)
+    left = local_mean(i_q - delayed(np.clip(wanted, -limit, limit), lag), LOCAL)
+    column = local_mean(delayed(felt, lag), LOCAL)
     return np.stack([column, np.ones_like(column)], axis=-1)[0, SETTLED:], left[0, SETTLED:]
-
-
-def _shifted(x: Array, late: float) -> Array:
-    """A signal (1, n_times) so many samples later, or earlier; its ends are held."""
-    t = np.arange(x.shape[1])
-    return np.interp(t - late, t, x[0])[None]

@@ -12,7 +12,7 @@ from ema.core.errors import RecordError
 from ema.core.records import Array, Record
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.findings import Findings
-from ema.discrepancy.grade import NAMED
+from ema.discrepancy.grade import IN_SET, NAMED
 from ema.discrepancy.progress import Progress
 from ema.discrepancy.report import Picture
 from ema.effects import registry
@@ -48,7 +48,6 @@ from .verdicts import settle_at_minimum
 from .weighing import is_credible
 
 MIN_CYCLES = 2
-IN_SET = 0.05  # share of what is sure of a set, below which a member is none: the others are a set of 95 %
 N_BESIDE = 2  # turns in which faults of each cycle are found anew beside the effects
 
 

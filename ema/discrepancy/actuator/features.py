@@ -108,12 +108,11 @@ def acceleration(theta: Array, m: int, T: float) -> Array:
 
 
 def delayed(x: Array, samples: float) -> Array:
-    """The signal a (fractional) number of samples ago; before the start its first value."""
-    whole = int(samples)
+    """The signal a (fractional) number of samples ago, or ahead where that is negative; its ends are held."""
+    whole = int(np.floor(samples))
     share = samples - whole
-    padded = np.concatenate([np.repeat(x[..., :1], whole + 1, axis=-1), x], axis=-1)
-    n = x.shape[-1]
-    return np.asarray((1.0 - share) * padded[..., 1 : 1 + n] + share * padded[..., :n])
+    at, last = np.arange(x.shape[-1]) - whole, x.shape[-1] - 1
+    return np.asarray((1.0 - share) * x[..., at.clip(0, last)] + share * x[..., (at - 1).clip(0, last)])
 
 
 @njit(cache=True, nogil=True)

@@ -21,7 +21,7 @@ from ema.models.actuator import Actuator
 from ema.models.layout import STATE
 
 from .delays import see_delays
-from .features import Signals, features, floors, slices, stacked
+from .features import Signals, delayed, features, floors, slices, stacked
 from .gear import Resonance
 from .measured import Measured
 from .runs import Asked, Memory, Runs, Work
@@ -148,7 +148,7 @@ class EmaPlant:
         r = hf.simulate(
             self.plant,
             k,
-            _earlier(command, self.late),
+            delayed(command, -self.late),
             seeds=np.asarray(seeds),
             start=start,
             effects=self._effects(points),
@@ -258,9 +258,3 @@ class EmaPlant:
                 values = [point.get(name, self.neutral(name)) for name in names]
                 error[run] += law.laws["angle_error"](float(self.data.start[cycle, 1]), *values)
         return np.asarray(error)
-
-
-def _earlier(x: Array, samples: int) -> Array:
-    """A signal (n, n_times) so many samples earlier; its ends are held."""
-    at = np.clip(np.arange(x.shape[1]) + samples, 0, x.shape[1] - 1)
-    return np.asarray(x[:, at])

@@ -32,7 +32,12 @@ class Entry:
 
 def log_prior(causes: Iterable[Cause]) -> float:
     """Log prior odds of just these causes against none."""
-    return sum(float(np.log(c.prior) - np.log1p(-c.prior)) for c in causes)
+    return sum(log_odds(c.prior) for c in causes)
+
+
+def log_odds(p: float) -> float:
+    """Of a probability against its contrary."""
+    return float(np.log(p) - np.log1p(-p))
 
 
 def posterior(

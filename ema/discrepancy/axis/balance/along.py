@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
@@ -198,18 +199,16 @@ def _gear_lines(m: Motion, span: float, u: Units) -> Iterator[Law]:
         if n * span < 2.0 * np.pi:
             continue
         whole = round(n) >= 1 and abs(n - round(n)) * span < np.pi
-        yield Law(
+        law = _torque_line(
             GEAR_LINE,
             f"gear line {n:.6g}",
             "gear_error",
-            _line(n),
-            {"amplitude": u.torque, "order": "1/turn", "phase": "rad"},
-            _of_line(n),
+            n,
             f"gear error: a {u.said} of {{amplitude:.3g}} {u.torque} with {{order:.5g}} periods per turn",
             "the motor alone, uncoupled from the gear; or the position at both sides of the gear",
-            also=("cogging",) if whole else (),
-            n_columns=2,
+            u,
         )
+        yield replace(law, also=("cogging",)) if whole else law
 
 
 def _lines(span: float, u: Units, *, linear: bool, but: tuple[float, ...]) -> Iterator[Law]:
@@ -222,31 +221,34 @@ def _lines(span: float, u: Units, *, linear: bool, but: tuple[float, ...]) -> It
         yield _line_along(float(n), step, u) if linear else _line_of_a_turn(float(n), u)
 
 
+def _torque_line(family: str, key: str, name: str, n: float, sentence: str, separated_by: str, u: Units) -> Law:
+    """A sin(nθ + φ)"""
+    order = "rad/m" if u is LINEAR else "1/turn"
+    parameters = {"amplitude": u.torque, "order": order, "phase": "rad"}
+    return Law(family, key, name, _line(n), parameters, _of_line(n), sentence, separated_by, n_columns=2)
+
+
 def _line_of_a_turn(n: float, u: Units) -> Law:
-    return Law(
+    return _torque_line(
         TORQUE_LINE,
         f"line {n:.5g}",
         "cogging",
-        _line(n),
-        {"amplitude": u.torque, "order": "1/turn", "phase": "rad"},
-        _of_line(n),
+        n,
         f"a {u.said} of {{amplitude:.3g}} {u.torque} with {{order:.4g}} periods per turn",
         "slow motion over a full turn, with the drive off",
-        n_columns=2,
+        u,
     )
 
 
 def _line_along(n: float, step: float, u: Units) -> Law:
     """No order is whole along a travel: lines stand for all that lie between them, `step` [rad/m] apart."""
-    return Law(
+    law = _torque_line(
         TRAVEL_LINE,
         f"line {n:.8g}",
         "position_line",
-        _line(n),
-        {"amplitude": u.torque, "order": "rad/m", "phase": "rad"},
-        _of_line(n),
+        n,
         f"a {u.said} of {{amplitude:.3g}} {u.torque} once in {2.0 * np.pi / n:.4g} m of travel",
         "slow motion over the whole travel",
-        n_columns=2,
-        finer=lambda share: [_line_along(n + side * share * step, step, u) for side in (-1.0, 1.0)],
+        u,
     )
+    return replace(law, finer=lambda share: [_line_along(n + side * share * step, step, u) for side in (-1.0, 1.0)])
