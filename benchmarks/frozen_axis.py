@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
 from benchmarks import frozen, strata_axis
 from ema.core.errors import RecordError
@@ -51,7 +52,7 @@ def beside_truth(t: strata_axis.Trial, said: dict[str, Any]) -> dict[str, Any]:
     # of two lines of cogging the first, larger one is the one whose amplitude is told in the truth
     quantities = {f"{e['name']}.{name}": q for e in reversed(effects) for name, q in e["parameters"].items()}
     true = {name: x for name, x in t.truth.items() if name in quantities and name in strata_axis.EXACT}
-    sd = {name: (quantities[name]["high"] - quantities[name]["low"]) / 3.92 for name in true}
+    z = {name: _deviations(quantities[name], x) for name, x in true.items()}
     result = outcome(t, said)
     hit = {name for e in effects for name in (e["name"], *e["indistinguishable_from"])}
     missed = [strata_axis.nats(t, name) for name in t.effects if name not in hit] if result == "missed" else []
@@ -61,9 +62,15 @@ def beside_truth(t: strata_axis.Trial, said: dict[str, Any]) -> dict[str, Any]:
         "confidence": [e["confidence"] for e in effects],
         "posterior": said.get("posterior", [])[:5],
         "of_set": [e.get("of_set") for e in effects],
-        "z": {name: (quantities[name]["value"] - x) / sd[name] for name, x in true.items() if sd[name] > 0.0},
+        "z": {name: x for name, x in z.items() if np.isfinite(x)},
         **said["gain"]["heldout"], "said": said["structure"].get("sentences", []),
     }  # fmt: skip
+
+
+def _deviations(told: dict[str, float], x: float) -> float:
+    """How far a told value is from the true one, where the interval's end on that side is 1.96 away."""
+    value, side = told["value"], told["high"] - told["value"] if x > told["value"] else told["value"] - told["low"]
+    return 1.96 * (value - x) / side if side > 0.0 else np.nan
 
 
 def outcome(t: strata_axis.Trial, findings: dict[str, Any]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,7 @@ def examine(plant: Plant, progress: Progress | None = None, reread: Reread | Non
     chosen = list(state.model.accepted)  # where folds suggested different parameters, those of the first fold
     free = [*plant.base, *(f for c in chosen for f in c.free)]
     final = fit(plant, free, state.model.fits[0].point, everything)
+    draw = partial(weighed.draw, trust=trust, model=state.model, final=final)
     before = fit(plant, plant.base, plain.fits[0].point, everything)
     terms = [c for c in chosen if c.is_structure]
     outcome = grade(left, named=len(terms) < len(chosen))
@@ -59,7 +61,7 @@ def examine(plant: Plant, progress: Progress | None = None, reread: Reread | Non
         verdict=outcome,
         because=verdict.because,
         p_value=verdict.p_value,
-        effects=describe_effects(plant, state, trust, weighed, final.point, final.draw),
+        effects=describe_effects(plant, state, trust, weighed, final.point, draw),
         structure=plant.describe_structure(terms, final.point) if terms or outcome == "unexplained" else {},
         train=training_gain(plant, plain, state.model),
         heldout=Gain(folds.err_before, folds.err_after, folds.noise_floor),

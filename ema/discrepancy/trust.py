@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.stats import norm
 
 from .fitting import WILD, Fit
 from .grade import NAMED
@@ -42,6 +43,8 @@ def drop_unlikely(plant: Plant, state: State, progress: Progress) -> tuple[dict[
         state.unlikely.append(_unlikely(worst, odds[worst], without, state.model))
         state.model = without
         del state.rounds[k]
+        for j, (trials, _) in enumerate(state.rounds):
+            state.rounds[j] = trials, leave_out(plant, without, {j})
 
 
 def describe_effects(
@@ -87,7 +90,8 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
 
     The mark of an effect is what the mean square of the held-out residual loses by it. Beside it stand what is left
     unexplained, what only nameless terms explain, and what the other effects' laws may miss by having the wrong form:
-    any of them may be what the effect is mistaken for. Of the last, as much as looks like it (`_looks_like`).
+    any of them may be what the effect is mistaken for. Of the last, as much as looks like it (`_looks_like`), and no
+    more than what is left allows: were the effect a stand-in for a share s of it, the share 1 - s would be left.
     """
     accepted = state.model.accepted
     terms = {k for k, c in enumerate(accepted) if c.is_structure}
@@ -98,14 +102,27 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
     befores = {c.key: of[1] for c, of in zip(accepted, state.rounds, strict=True) if not c.is_structure}
     marks = {key: max(above_noise(before) - above_noise(state.model), 0.0) for key, before in befores.items()}
     made = {key: _differences(before, state.model) for key, before in befores.items()}
+    left = _expected_left(state.model, plant.noise_uncertainty)
     trust = {}
     for key, mark in marks.items():
-        form = sum(FORM**2 * marks[o] * _looks_like(made[key], made[o]) for o in marks if o != key)
+        form = 0.0
+        for o in marks.keys() - {key}:
+            s = _looks_like(made[key], made[o])
+            form += s * min(FORM**2 * marks[o], left / max(1.0 - s, 1e-9))
         trust[key] = mark / (mark + unknown + form) if mark > 0.0 else 0.0
     for c in accepted:
         if c.key in trust and _leans(state.model.fits[0], c):
             trust[c.key] *= 0.5
     return trust
+
+
+def _expected_left(model: Tried, noise_uncertainty: float) -> float:
+    """Mean square that a model leaves beyond noise, where the noise's amplitude has a relative standard deviation."""
+    sd = 2.0 * noise_uncertainty
+    if sd == 0.0:
+        return above_noise(model)
+    z = (model.rms**2 - 1.0) / sd
+    return float(sd * (z * norm.cdf(z) + norm.pdf(z)))
 
 
 def _unlikely(key: str, odds: float, without: Tried, model: Tried) -> dict[str, Any]:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from .engine.posterior import PRIOR, Entry, log_odds, p_cause, posterior, thin
+from .fitting import Fit
 from .grade import IN_SET
+from .plant import Point
 from .selection import NEARLY_NOISE, SAME_SHARE, Tried, is_nameless, log_scores
 
 TOLD = 1e-3  # probability from which a set is told
@@ -15,12 +17,13 @@ TOLD = 1e-3  # probability from which a set is told
 
 @dataclass(frozen=True)
 class Weighed:
-    """Sets of effects by their probability, and the trials in the place of each effect of the model.
+    """Sets of effects by their probability, and as they were fitted; the trials in the place of each of the model's.
 
     `effects` are the names in the library of what the sets hold; terms without a name are not among them.
     """
 
     entries: list[Entry]
+    sets: dict[tuple[str, ...], Tried]
     in_place: dict[str, dict[str, Tried]]
     effects: dict[str, str]
 
@@ -40,9 +43,7 @@ class Weighed:
         """
         if len(self.entries) < 2:
             return []
-        share = {other: trust.get(key, 1.0) for key, trials in self.in_place.items() for other in trials}
-        keys = {key for e in self.entries for key in e.causes}
-        entries = thin(self.entries, {**dict.fromkeys(keys, 1.0), **share, **trust})
+        entries = self._thinned(trust)
         top = max(e.log_evidence for e in entries)
         return [
             {
@@ -55,6 +56,24 @@ class Weighed:
             for e in entries
             if e.probability >= TOLD
         ]
+
+    def draw(self, n: int, trust: Mapping[str, float], model: Tried, final: Fit) -> list[Point]:
+        """About `n` points, from every set as many as it is likely: of the `model` by its `final` fit to all records.
+
+        So a size is as uncertain as it is unclear which other effects are there.
+        """
+        points: list[Point] = []
+        for entry in self._thinned(trust):
+            of = self.sets.get(entry.causes)
+            fits = (final,) if entry.causes == _names(model) else of.fits if of else ()
+            for fit in fits:
+                points += fit.draw(round(n * entry.probability / len(fits)))
+        return points or final.draw(n)
+
+    def _thinned(self, trust: Mapping[str, float]) -> list[Entry]:
+        share = {other: trust.get(key, 1.0) for key, trials in self.in_place.items() for other in trials}
+        keys = {key for e in self.entries for key in e.causes}
+        return thin(self.entries, {**dict.fromkeys(keys, 1.0), **share, **trust})
 
 
 def weigh_sets(plain: Tried, model: Tried, rounds: Sequence[tuple[dict[str, Tried], Tried]]) -> Weighed:
@@ -80,7 +99,7 @@ def weigh_sets(plain: Tried, model: Tried, rounds: Sequence[tuple[dict[str, Trie
         for own, (trials, _) in zip(model.accepted, rounds, strict=True)
     }
     effects = {c.key: c.effect for t in sets.values() for c in t.accepted if not c.is_structure}
-    return Weighed(posterior(evidence, form, parts), in_place, effects)
+    return Weighed(posterior(evidence, form, parts), sets, in_place, effects)
 
 
 def _names(tried: Tried) -> tuple[str, ...]:

@@ -63,7 +63,11 @@ class Toy:
     def describe(self, candidates, point, draw):
         drawn = draw(50)
         return [
-            {"key": c.key, "name": c.effect, "parameters": {f.name: [p[f.name] for p in drawn] for f in c.free}}
+            {
+                "key": c.key,
+                "name": c.effect,
+                "parameters": {f.name: [p[f.name] for p in drawn if f.name in p] for f in c.free},
+            }
             for c in candidates
         ]
 

@@ -7,15 +7,13 @@ import numpy as np
 from ema.discrepancy.fitting import Fit
 from ema.discrepancy.plant import Block, Candidate, Free
 from ema.discrepancy.progress import Progress
-from ema.discrepancy.rounds import State
+from ema.discrepancy.rounds import State, leave_out
 from ema.discrepancy.selection import Tried
 from ema.discrepancy.trust import drop_unlikely, leans_in_a_fold
 
 N_BLOCKS, N = 12, 200
-LARGE, SMALL = (
-    3.0,
-    0.3,
-)  # what effects do to the residual, over noise: less than a sixth of the larger one's is its form
+# what effects do to the residual, over noise: less than a sixth of the larger one's is its form
+LARGE, SMALL = 3.0, 0.3
 
 
 def line(order, value):
@@ -90,3 +88,37 @@ def test_what_another_law_would_make_were_it_stronger_in_some_blocks_is_told_as_
     stays, _, unlikely = named(lambda large: 0.1 * late * large, lambda large, small: small)
     assert stays == ["large"]
     assert unlikely == ["small"]
+
+
+def like_in_part(large):
+    """Half of it is what the large one would make were it stronger in late blocks, half its own."""
+    late = (np.arange(N_BLOCKS) >= N_BLOCKS // 2)[:, None]
+    own = np.random.default_rng(3).standard_normal((N_BLOCKS, N))
+    return SMALL * (late * large / LARGE + np.sqrt(0.5) * own)
+
+
+def test_the_form_of_another_law_would_leave_what_does_not_look_like_the_effect():
+    _, trust, unlikely = named(like_in_part, lambda large, small: small)
+    assert trust["small"] > 0.9
+    assert unlikely == []
+
+
+def test_beside_a_rest_an_effect_that_looks_like_another_law_in_part_may_be_its_form():
+    rest = 0.2 * np.random.default_rng(4).standard_normal((N_BLOCKS, N))
+    _, trust, _ = named(like_in_part, lambda large, small: small + rest)
+    assert trust["small"] < 0.7
+
+
+def test_what_stays_is_judged_without_what_was_dropped():
+    """Either of two that are nearly alike does most alone, so neither is missed much while the other is there."""
+    rng = np.random.default_rng(2)
+    large = LARGE * rng.standard_normal((N_BLOCKS, N))
+    columns = {"large": large, "twin": 0.5 * large + SMALL * rng.standard_normal((N_BLOCKS, N))}
+    rest = np.sqrt(0.3) * rng.standard_normal((N_BLOCKS, N))
+    plant = Columns(columns, sum(columns.values()) + rest)
+    both = plant.tried("large", "twin")
+    rounds = [({name: both}, leave_out(plant, both, {j})) for j, name in enumerate(columns)]
+    state = State(plant.tried(), both, rounds, [])
+    trust, _ = drop_unlikely(plant, state, Progress())
+    assert [row["name"] for row in state.unlikely] == ["twin"]
+    assert trust["large"] > 0.9

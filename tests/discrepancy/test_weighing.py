@@ -12,7 +12,7 @@ from ema.discrepancy.engine.posterior import Entry, p_cause, posterior, thin
 from ema.discrepancy.fitting import Fit
 from ema.discrepancy.plant import Candidate, Free
 from ema.discrepancy.selection import Tried
-from ema.discrepancy.weighing import weigh_sets
+from ema.discrepancy.weighing import Weighed, weigh_sets
 
 N, N_PARTS = 400, 40
 N_TOYS = 1000
@@ -97,6 +97,26 @@ def test_what_is_there_is_sure_and_alone_where_nothing_looks_like_it():
     assert list(found.instead("one")) == ["one"]
     assert found.instead("one")["one"] > 0.99
     assert found.described({})[0]["effects"] == ["one"]
+
+
+def test_a_size_is_as_uncertain_as_it_is_unclear_what_else_is_there():
+    """A second effect is as likely as not; with it the first is 1, without 3: points come of both sets, half each."""
+    frees = {n: Free(n, "1", -5.0, 5.0, 1.0, 0.1) for n in ("one", "other")}
+    candidates = {n: Candidate(n, n, (f,), ({n: 1.0},)) for n, f in frees.items()}
+
+    def of(size, *names):
+        fit = Fit(tuple(frees[n] for n in names), dict.fromkeys(names, size), [], 1e-6 * np.eye(len(names)), (), 1.0,
+                  np.eye(len(names)))  # fmt: skip
+        return Tried(tuple(candidates[n] for n in names), (fit, fit), (), ())
+
+    sets = {ONE: of(3.0, "one"), ("one", "other"): of(1.0, "one", "other")}
+    entries = [Entry(("one", "other"), 1.0, 0.0, 0.0)]
+    model = sets[ONE]
+    drawn = Weighed(entries, sets, {}, {}).draw(1000, {"other": 0.5}, model, model.fits[0])
+    sizes = np.array([p["one"] for p in drawn])
+    assert len(sizes) == pytest.approx(1000, abs=2)
+    assert np.mean(np.isclose(sizes, 3.0, atol=0.1)) == pytest.approx(0.5, abs=0.01)
+    assert np.mean(np.isclose(sizes, 1.0, atol=0.1)) == pytest.approx(0.5, abs=0.01)
 
 
 def test_what_may_stand_for_something_unknown_takes_its_share_of_every_set():
