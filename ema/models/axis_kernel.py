@@ -224,7 +224,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
     gain = 1.0 / (1.0 + z[GAIN])
     R_now = z[R] * resistance_factor(z, 0, 1, z[DT])
     skew = 1.0 + z[SKEW]
-    d_w = z[SPEED_DELAY]
+    d_w = z[SPEED_DELAY] / skew  # of the recorded clock
     i, i_end, asked, slope, dw = 0.0, 0.0, 0.0, 0.0, 0.0
     if mode == VOLTAGE:
         u = (drive[0] - z[OFFSET]) * gain
@@ -234,7 +234,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
         if mode == CURRENT:
             i = (drive[k] - z[OFFSET]) * gain
         elif mode == SPEED_LOOP:
-            w_meas = delayed(t, out[1], k, d_w, slope)
+            w_meas = delayed(t, out[1], k, d_w, slope * skew)
             asked = z[K_W] * (drive[k] - w_meas)
             i = min(max(asked, -z[I_MAX]), z[I_MAX])
         out[2, k] = i
@@ -310,8 +310,8 @@ def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
     for k in range(n - 1, -1, -1):  # backwards, since the undelayed values of earlier samples are still needed
         theta = out[0, k]
         if z[POSITION_DELAY] > 0.0:
-            theta = delayed_position(t, out[0], out[1], k, z[POSITION_DELAY], slope, skew)
-        w = delayed(t, out[1], k, z[SPEED_DELAY], slope) if z[SPEED_DELAY] > 0.0 else out[1, k]
+            theta = delayed_position(t, out[0], out[1], k, z[POSITION_DELAY] / skew, slope, skew)
+        w = delayed(t, out[1], k, z[SPEED_DELAY] / skew, slope * skew) if z[SPEED_DELAY] > 0.0 else out[1, k]
         out[0, k] = theta + angle_error(z, 0, 1, theta) + position_error(z, 0, 1, theta)
         out[1, k] = w * (1.0 + _slope(z, theta, False))
         if mode in (CURRENT, SPEED_LOOP):

@@ -162,6 +162,15 @@ def test_a_late_position_is_where_the_axis_was_between_samples_and_before_the_fi
     np.testing.assert_allclose(out[0], 0.2 - 30.0 * then + 0.5 * a * then**2, atol=1e-9)
 
 
+@pytest.mark.parametrize("sensor", ["position", "speed"])
+def test_how_late_a_sensor_is_does_not_depend_on_the_clock_of_the_record(sensor):
+    i, late, clock = 0.4 * np.sin(20.0 * T), 2.7e-3, 1.02
+    effects = {f"{sensor}_delay": {"time": late}}
+    right = run(FREE, "current", i, effects=effects)
+    off = run(FREE, "current", i, effects=effects | {"clock_skew": {"rate": 1.0 / clock - 1.0}}, t=clock * T)
+    np.testing.assert_allclose(off[:2], right[:2], rtol=1e-6, atol=1e-9)
+
+
 def test_a_load_of_which_nothing_is_known_before_moves_as_its_motor_does():
     numbers = axis.model(FREE, {"gear_compliance": GEAR["gear_compliance"]})
     t = np.arange(0.0, 0.01, 1e-3)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +15,25 @@ from .windows import Bench, Window
 
 History = tuple[NDArray[np.int64], Array, Array, Array, NDArray[np.bool_]]
 MEMORY = 1.0  # [s] for which a load behind a gear is followed before a window
+
+
+@dataclass(frozen=True)
+class LedIn:
+    """Windows with up to `n` samples of motion before each; `kept` are the samples that are the windows' own."""
+
+    n: int
+    offsets: NDArray[np.int64]
+    t: Array
+    drive: Array
+    kept: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, windows: list[Window], n: int) -> LedIn:
+        """Led in by `n` samples, where the axis was moving by then as it does in the window."""
+        t, drive = zip(*(w.led_in(n) for w in windows), strict=True)
+        kept = [np.arange(len(at)) >= len(at) - w.n for at, w in zip(t, windows, strict=True)]
+        offsets = np.concatenate(([0], np.cumsum([len(at) for at in t]))).astype(np.int64)
+        return cls(n, offsets, np.concatenate(t), np.concatenate(drive), np.concatenate(kept))
 
 
 class Pack:
@@ -30,33 +52,45 @@ class Pack:
         directions = [w.direction for w in windows if w.direction is not None]
         self.direction = np.concatenate(directions) if directions else None
         self.filter = join(filters) if filters else None
-        self._histories: dict[float, History] = {}  # the last one asked for
+        self._led_in = {0: LedIn.of(windows, 0)}  # and the last other one asked for
+        self._histories: dict[tuple[float, int], History] = {}  # the last one asked for
 
-    def drive_by(self, clock: float) -> Array:
-        """The drive at the samples of the motion, where it has a clock of its own."""
-        return self.drive if clock == 0.0 else np.concatenate([w.drive_by(clock) for w in self.windows])
+    def led_in(self, late: float) -> LedIn:
+        """The windows, each with the motion before it that a sensor shows in it which is `late`. [s]"""
+        n = math.ceil(late / self.windows[0].period - 1e-9)
+        if n not in self._led_in:
+            self._led_in = {0: self._led_in[0], n: LedIn.of(self.windows, n)}
+        return self._led_in[n]
 
-    def history(self, late: float = 0.0) -> History:
-        """Motion before each window since the one before it, of a position that is recorded `late`. [s]
+    def drive_by(self, clock: float, led_in: LedIn) -> Array:
+        """The drive there, where it has a clock of its own."""
+        if clock == 0.0:
+            return led_in.drive
+        return np.concatenate([w.drive_by(clock, led_in.n) for w in self.windows])
+
+    def history(self, late: float = 0.0, n: int = 0) -> History:
+        """Motion before `n` samples before each window, since the one before it, of a position that is recorded `late`.
 
         Offsets, time, position, speed, and whether it follows.
         """
-        if late not in self._histories:
-            self._histories = {late: self._history(late)}
-        return self._histories[late]
+        if (late, n) not in self._histories:
+            self._histories = {(late, n): self._history(late, n)}
+        return self._histories[late, n]
 
-    def _history(self, late: float) -> History:
+    def _history(self, late: float, n: int) -> History:
         parts, follows = [], []
-        chain, last = -1, 0.0
+        number, last = -1, 0.0
         for w in self.windows:
-            t, theta, speed = w.around
-            end = min(w.t[0] + late, t[-1])
+            if w.part is None:
+                continue
+            t, theta, speed = w.part.t, w.part.recorded, w.part.speed
+            end = min(t[w.begin(n)] + late, t[-1])
             first = max(end - MEMORY, t[0])
-            follows.append(chain == w.chain and first <= last <= end)
+            follows.append(number == w.part.number and first <= last <= end)
             at = np.array([last if follows[-1] else first, end])
             at = np.unique(np.concatenate((at, t[(t > at[0]) & (t < end)])))
             parts.append((at, np.interp(at, t, theta), np.interp(at, t, speed)))
-            chain, last = w.chain, end
+            number, last = w.part.number, end
         offsets = np.concatenate(([0], np.cumsum([len(t) for t, *_ in parts]))).astype(np.int64)
         t, theta, speed = (np.concatenate(column) for column in zip(*parts, strict=True))
         return offsets, t, theta, speed, np.array(follows)

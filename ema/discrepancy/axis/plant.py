@@ -202,12 +202,13 @@ class AxisPlant:
         if pack.direction is not None:
             return axis.holding(model, pack.position + zero, pack.direction, pack.t)[None, :]
         step = self._step(pack)
-        starts = self._starts(pack, model, step)
+        led_in = pack.led_in(max(_late(model)))
+        starts = self._starts(pack, model, step, led_in.n)
         starts[:, 0] += zero
         drive = pack.bench.roles.kind
-        record = (pack.offsets, pack.t, pack.drive_by(model.z[row("clock_skew.currents")]), starts)
-        bristles = self._bristles(pack, model)
-        out = axis.simulate(model, drive, *record, step, pack.dT, pack.slide, self.between, bristles)
+        record = (led_in.offsets, led_in.t, pack.drive_by(model.z[row("clock_skew.currents")], led_in), starts)
+        bristles = self._bristles(pack, model, led_in.n)
+        out = axis.simulate(model, drive, *record, step, pack.dT, pack.slide, self.between, bristles)[:, led_in.kept]
         out[0] -= zero
         return out[[_KERNEL_ROW[name] for name in pack.bench.roles.outputs]]
 
@@ -262,32 +263,45 @@ class AxisPlant:
         period = pack.windows[0].period
         return max(period / 10.0, min(period, H_MAX))
 
-    def _starts(self, pack: Pack, model: axis.Model, step: float) -> Array:
-        """True start states: the smoothed measurement, undone for what the model's sensors do; the twist of a gear."""
-        z = model.z
+    def _starts(self, pack: Pack, model: axis.Model, step: float, n: int) -> Array:
+        """True states `n` samples before the windows: the smoothed measurement, undone for what the model's sensors do.
+
+        And the twist of a gear.
+        """
         starts = np.zeros((len(pack.windows), 4))
-        late_theta, late_w = z[row("position_delay.time")], z[row("speed_delay.time")]
+        late_theta, late_w = _late(model)
         if pack.bench.roles.speed is None:
             late_w = late_theta
         for place, w in enumerate(pack.windows):
-            starts[place, 0] = w.position[0] if late_theta == 0.0 else np.interp(w.t[0] + late_theta, w.t, w.position)
-            starts[place, 1] = w.speed[0] if late_w == 0.0 else np.interp(w.t[0] + late_w, w.t, w.speed)
+            if w.part is not None:
+                k = w.begin(n)
+                t, theta, speed = (x[k:] for x in (w.part.t, w.part.position, w.part.speed))
+                starts[place, 0] = theta[0] if late_theta == 0.0 else np.interp(t[0] + late_theta, t, theta)
+                starts[place, 1] = speed[0] if late_w == 0.0 else np.interp(t[0] + late_w, t, speed)
         if axis.is_flexible(model):
-            starts[:, 2:] = starts[:, :2] - axis.loads_after(model, *pack.history(late_theta), step)
+            starts[:, 2:] = starts[:, :2] - axis.loads_after(model, *pack.history(late_theta, n), step)
         starts[:, :2] = axis.true_state(model, starts[:, :2], derived=pack.bench.roles.speed is None)
         return starts
 
-    def _bristles(self, pack: Pack, model: axis.Model) -> Array | None:
-        """Share of friction that is built up where windows begin, by the motion before them."""
+    def _bristles(self, pack: Pack, model: axis.Model, n: int) -> Array | None:
+        """Share of friction that is built up `n` samples before windows, by the motion before that."""
         if not axis.has_memory(model):
             return None
         play = NOISE * position_noise(pack.bench, pack.windows[0])
-        return axis.bristles_after(model, *pack.history(model.z[row("position_delay.time")]), play)
+        return axis.bristles_after(model, *pack.history(_late(model)[0], n), play)
 
     def main_row(self, block: int) -> int:
         """Row of the output that is shown and whose error is reported."""
         who = self._bench_of[block].roles
         return who.outputs.index(who.speed) if who.speed in who.outputs and not self.windows[block].static else 0
+
+
+def _late(model: axis.Model) -> tuple[float, float]:
+    """By how much position and speed are late, by the clock of the record. [s]"""
+    theta, w, rate = (
+        float(model.z[row(name)]) for name in ("position_delay.time", "speed_delay.time", "clock_skew.rate")
+    )
+    return theta / (1.0 + rate), w / (1.0 + rate)
 
 
 _KERNEL_ROW = {"theta_m": 0, "q": 0, "w_m": 1, "v": 1, "i_q": 2, "u_q": 3}

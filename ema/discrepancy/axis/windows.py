@@ -29,12 +29,27 @@ STRETCH = 0.4  # [s] windows closer together are not independent enough to check
 
 
 @dataclass(frozen=True)
+class Part:
+    """Samples of one cycle from gap to gap, in arrays of shape (n_times,).
+
+    Drive and position as recorded, smooth position and speed; `number` is like no other part's of the record.
+    """
+
+    number: int
+    t: Array
+    drive: Array
+    recorded: Array
+    position: Array
+    speed: Array
+
+
+@dataclass(frozen=True)
 class Window:
     """Consecutive samples of one cycle, in arrays of shape (n_times,).
 
     `outputs` has one row per output channel of its record. `position`, `speed` are smooth; `static` windows hold
-    samples at rest with the `direction` of approach. `around` is time, position as recorded and smooth speed from
-    gap to gap (`chain` is the number of that part). `course` is time and drive of the whole cycle.
+    samples at rest with the `direction` of approach. `course` is time and drive of the whole cycle. The window begins
+    at sample `first` of its `part`, and the axis has moved in one direction since sample `earliest`.
     """
 
     group: str
@@ -48,9 +63,10 @@ class Window:
     static: bool = False
     direction: Array | None = None
     stretch: int = 0
-    around: tuple[Array, Array, Array] = (np.empty(0), np.empty(0), np.empty(0))
     course: tuple[Array, Array] = (np.empty(0), np.empty(0))
-    chain: int = 0
+    part: Part | None = None
+    first: int = 0
+    earliest: int = 0
 
     @property
     def n(self) -> int:
@@ -62,12 +78,24 @@ class Window:
         """Median time between samples. [s]"""
         return float(np.median(np.diff(self.t)))
 
-    def drive_by(self, clock: float) -> Array:
-        """The drive at the samples of the motion, where its own interval is off by a share `clock`: straight lines."""
+    def begin(self, n: int) -> int:
+        """Sample of its part `n` before the window, if the axis was moving by then as it does in the window."""
+        return max(self.first - n, min(self.earliest, self.first))
+
+    def led_in(self, n: int) -> tuple[Array, Array]:
+        """Time and drive of the window and up to `n` samples before it."""
+        if self.part is None or n == 0:
+            return self.t, self.drive
+        rows = slice(self.begin(n), self.first + self.n)
+        return self.part.t[rows], self.part.drive[rows]
+
+    def drive_by(self, clock: float, n: int = 0) -> Array:
+        """The drive there, where its own interval is off by a share `clock`: straight lines."""
+        at, own = self.led_in(n)
         if clock == 0.0:
-            return self.drive
+            return own
         t, drive = self.course
-        return np.interp(self.t, t[0] + (t - t[0]) * (1.0 + clock), drive)
+        return np.interp(at, t[0] + (t - t[0]) * (1.0 + clock), drive)
 
 
 @dataclass(frozen=True)
@@ -136,29 +164,31 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
     still = np.abs(speed) < AT_REST * START_NOISE * speed_noise(who, noise, dt)
     margin = HALF if who.speed is not None else 2 * HALF  # over which the smoothed speed mixes rest with motion
     rests = _rests(still | _reversals(speed), margin)
+    turns = np.flatnonzero(np.diff(np.sign(speed)) != 0.0) + 1
+    anew = np.unique(np.concatenate(([0], cuts, gaps, np.flatnonzero(still) + 1, turns)))  # what was before is no lead
     edges = np.unique(np.concatenate(([0], cuts, gaps, rests.ravel(), [n]))).astype(int)
     n_window = max(MIN_WINDOW, round(length / dt))
     out = []
-    first = cycle.number * 1_000_000  # stretches of different cycles are different
+    number = cycle.number * 1_000_000  # stretches and parts of different cycles are different
+    starts = np.array([0, *gaps])
+    pieces = zip(*(np.split(x, gaps) for x in (t, cycle[who.drive], raw, smooth, speed)), strict=True)
+    parts = [Part(number + start, *piece) for start, piece in zip(starts.tolist(), pieces, strict=True)]
     for a, b in pairwise(edges.tolist()):
         if any(start <= a < stop for start, stop in rests):
             continue
         n_parts = max(1, round((b - a) / n_window))
-        for part in np.array_split(np.arange(a, b), n_parts):
-            if len(part) >= MIN_WINDOW:
-                rows = slice(int(part[0]), int(part[-1]) + 1)
-                outputs = np.stack([cycle[name][rows] for name in who.outputs])
-                label = f"{group}, {cycle}, {t[rows][0]:.4g} s"
-                stretch = first + int((t[rows][0] - t[0]) / max(STRETCH, length))
-                columns = (t[rows], cycle[who.drive][rows], outputs, smooth[rows], speed[rows])
-                dT = float(np.mean(warmer[rows]))
-                gap = max(gap for gap in (0, *gaps.tolist()) if gap <= part[0])
-                whole = slice(gap, min((end for end in gaps.tolist() if end > part[0]), default=n))
-                around = (t[whole], raw[whole], speed[whole])
-                course, chain = (t, cycle[who.drive]), cycle.number * 1_000_000 + gap
-                out.append(
-                    Window(group, label, *columns, dT, stretch=stretch, around=around, course=course, chain=chain)
-                )
+        for inside in np.array_split(np.arange(a, b), n_parts):
+            if len(inside) < MIN_WINDOW:
+                continue
+            rows = slice(int(inside[0]), int(inside[-1]) + 1)
+            outputs = np.stack([cycle[name][rows] for name in who.outputs])
+            label = f"{group}, {cycle}, {t[rows][0]:.4g} s"
+            stretch = number + int((t[rows][0] - t[0]) / max(STRETCH, length))
+            motion = (t[rows], cycle[who.drive][rows], outputs, smooth[rows], speed[rows], float(np.mean(warmer[rows])))
+            k = int(np.searchsorted(starts, a, side="right")) - 1
+            earliest = anew[np.searchsorted(anew, rows.start, side="right") - 1]
+            where = (parts[k], rows.start - int(starts[k]), int(earliest - starts[k]))
+            out.append(Window(group, label, *motion, False, None, stretch, (t, cycle[who.drive]), *where))
     return out
 
 

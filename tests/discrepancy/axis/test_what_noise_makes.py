@@ -123,8 +123,9 @@ def test_windows_of_a_record_lie_one_after_the_other_and_come_apart_again(quiet)
     parts = pack.split(pack.outputs)
     assert all((parts[j] == w.outputs).all() for j, w in enumerate(windows))
     assert pack.filter is None
-    assert pack.drive_by(0.0) is pack.drive
-    late = pack.drive_by(1e-3)
+    bare = pack.led_in(0.0)
+    assert (pack.drive_by(0.0, bare) == pack.drive).all()
+    late = pack.drive_by(1e-3, bare)
     assert late.shape == pack.drive.shape
     assert (late != pack.drive).any()
     assert set(pack.slide) <= {-1.0, 0.0, 1.0}
@@ -148,7 +149,7 @@ def test_the_motion_before_a_window_is_of_the_same_moment_where_its_position_is_
     late = 2.6e-3
     offsets, t, theta, *_ = Pack(quiet.benches[0], list(range(len(windows))), windows, []).history(late)
     own = [(t[b - 1], theta[b - 1]) for b in offsets[1:]]
-    there = [(w.t[0] + late, np.interp(w.t[0] + late, *w.around[:2])) for w in windows]
+    there = [(w.t[0] + late, np.interp(w.t[0] + late, w.part.t, w.part.recorded)) for w in windows]
     assert np.array(own) == pytest.approx(np.array(there))
 
 

@@ -53,7 +53,8 @@ def test_motion_is_smoothed_up_to_a_gap_and_not_across_it():
     windows = bench(PLANT, Record((cut,)), "one", 0.1).windows
     assert max(float(np.abs(w.position - 40.0 * w.t).max()) for w in windows) < 1e-9
     after = next(w for w in windows if w.t[0] == T[640])
-    assert [float(x[0]) for x in after.around] == pytest.approx([T[640], 40.0 * T[640], 40.0])
+    motion = (after.part.t, after.part.recorded, after.part.speed)
+    assert [float(x[0]) for x in motion] == pytest.approx([T[640], 40.0 * T[640], 40.0])
 
 
 def test_a_record_without_enough_samples_is_refused():
