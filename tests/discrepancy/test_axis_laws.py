@@ -99,6 +99,16 @@ def test_friction_that_grows_with_the_square_of_the_motor_torque_is_named_where_
     assert law["parameters"]["per_torque"]["value"] == pytest.approx(2.5, rel=0.05)
 
 
+def test_a_law_is_found_though_another_takes_more_where_it_happens_to_act(geared):
+    """In a hard start friction takes nearly all of the torque: a share of the load does so too, in two blocks of 54."""
+    axis = geared.Axis(F=0.02754, J=1.094e-4, by_square=4.179)
+    made = geared.record(axis, 69663, seconds=8.0, size=1.39)
+    plant = AxisPlant(RotaryAxis.model_validate(geared.plant(axis)), [made])
+    plant.between = "held"
+    (term,) = balance(plant).terms
+    assert term.law.key == "friction by square of motor"
+
+
 def test_a_law_that_takes_all_that_is_more_than_noise_is_needed_though_it_is_small_beside_the_drive(geared):
     """Less than a hundredth of the drive's torque; without it 16 times what noise makes is left, with it noise."""
     b = balance(plant_of(geared, F=0.0365, by_square=1.5, seconds=8.0))

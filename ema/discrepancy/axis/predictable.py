@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import stats
 
+from ema.models import axis
 from ema.models.axis_config import LinearAxis
 
 from .cogging import ALARM, integer_orders, scan
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 N_GROWTHS = 3.0  # growth of e^3 in a window
 LONGEST_WINDOW = 0.4  # [s]
+STEP = 1e-5  # of the travel, over which a torque's slope is taken
 
 
 def predictable_time(plant: Measured, bench: Bench) -> float:
@@ -32,8 +34,21 @@ def predictable_time(plant: Measured, bench: Bench) -> float:
     weak = thin(weak_form(plant, {}, moving))
     if len(weak.y) < FEWEST:
         return LONGEST_WINDOW
-    growth = max(_of_lines(plant, weak), _of_falling_friction(plant, weak))
+    growth = max(_of_plant_file(plant, weak), _of_lines(plant, weak), _of_falling_friction(plant, weak))
     return float(min(LONGEST_WINDOW, N_GROWTHS / growth)) if growth > 0.0 else LONGEST_WINDOW
+
+
+def _of_plant_file(plant: Measured, weak: Weak) -> float:
+    """λ, λ² = -dτ/dθ / J where the torque that the plant file knows drives away, as a pendulum's upright. [1/s]"""
+    m, model = weak.motion, plant.model({})
+    step = STEP * float(np.ptp(m.theta))
+    if step == 0.0:
+        return 0.0
+    left, right = (
+        axis.torque_along(model, m.theta + d, m.w, m.i, m.t, m.dT, force=plant.plant.is_force) for d in (-step, step)
+    )
+    slope = float(np.max((right - left) / (2.0 * step)))  # of what accelerates
+    return float(np.sqrt(max(slope, 0.0) / plant.plant.inertia))
 
 
 def _of_lines(plant: Measured, weak: Weak) -> float:

@@ -13,6 +13,8 @@ from ema.discrepancy.axis.zeros import zeros
 
 SIZE, ORDER, PHASE = 0.01, 12, 0.7
 AT = {"F_d": on_paper.F_D}
+SWING_OVER = on_paper.Swing(((4.0, 2.3, 0.3), (0.6, 7.1, 1.1)))  # past upright, at π
+SWING_BELOW = on_paper.Swing(((0.9, 2.3, 0.3), (0.3, 7.1, 1.1)))
 
 
 def ripple(t, theta, w):
@@ -93,6 +95,17 @@ def test_windows_are_as_long_as_deviations_may_grow(quiet, rippled):
     plant = on_paper.plant(on_paper.cycle(falling))
     growth = 0.02 / (on_paper.J * 0.5)
     assert predictable_time(plant, plant.benches[0]) == pytest.approx(N_GROWTHS / growth, rel=0.5)
+
+
+def test_windows_are_as_short_beside_a_torque_that_the_plant_file_knows():
+    """A pendulum drives away from upright: sin's steepest slope; one that the motion never brings there does not."""
+    A = 0.3
+    declared = {"effects": {"pendulum": {"amplitude": A, "phase": 0.0}}}
+    growth = np.sqrt(A / on_paper.J)
+    over = on_paper.plant(on_paper.cycle(lambda t, theta, w: A * np.sin(theta), swing=SWING_OVER), **declared)
+    assert predictable_time(over, over.benches[0]) == pytest.approx(N_GROWTHS / growth, rel=0.05)
+    below = on_paper.plant(on_paper.cycle(lambda t, theta, w: A * np.sin(theta), swing=SWING_BELOW), **declared)
+    assert predictable_time(below, below.benches[0]) == LONGEST_WINDOW
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -31,8 +31,9 @@ def choose_laws(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence
     model, declared = base, {law.key for law in given}
     while _n_laws(model) < MOST_LAWS:
         trials = _try_each(found, plain, model, [law for law in every if not _is_full(model, law)])
-        best = _choose_simplest(trials, asked)
-        if best is None or not is_needed(best, model, asked):
+        # not the best of all alone: a share of the load itself takes much of any drive, and blocks disagree on it
+        best = _choose_simplest([r for r in trials if is_needed(r, model, asked)], asked)
+        if best is None:
             break
         model = _revise(found, plain, best, every, asked)
     for _ in range(2 * MOST_LAWS):
