@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from ema.core.errors import RecordError
 from ema.core.records import Array, Cycle, Record
@@ -15,13 +15,15 @@ from ema.effects.base import T_REFERENCE
 from ema.models.axis_config import Axis
 
 from .channels import MIN_SAMPLES, Roles, roles
-from .noise import SIMULATED_TO, Noise, estimate, is_derived
+from .noise import ESTIMATE_UNCERTAINTY, SIMULATED_TO, Noise, estimate, is_derived
 
 HALF = 5  # samples on each side of a local quadratic
+WIDTHS = (2 * HALF + 1, 7, 5)  # samples of one from which a window may begin: no wider than the motion lets it
 GLITCH = 12.0  # noise amplitudes by which a step of position may miss the speed before the window is cut there
 MAX_SAMPLES = 12_000  # of one record
 STATIC_SAMPLES = 250
 MIN_WINDOW = 16  # samples
+TINY = 1e-300
 AT_REST = 3.0  # noise amplitudes of the smoothed speed below which nothing is seen to move
 SHORTEST_REST = 3  # samples
 START_NOISE = 1.5 / np.sqrt(2 * HALF + 1)  # of a smoothed start state, per noise of one sample
@@ -32,7 +34,7 @@ STRETCH = 0.4  # [s] windows closer together are not independent enough to check
 class Part:
     """Samples of one cycle from gap to gap, in arrays of shape (n_times,).
 
-    Drive and position as recorded, smooth position and speed; `number` is like no other part's of the record.
+    Drive and position as recorded, position and speed to begin from; `number` is like no other part's of the record.
     """
 
     number: int
@@ -171,7 +173,8 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
     out = []
     number = cycle.number * 1_000_000  # stretches and parts of different cycles are different
     starts = np.array([0, *gaps])
-    pieces = zip(*(np.split(x, gaps) for x in (t, cycle[who.drive], raw, smooth, speed)), strict=True)
+    started = _start_states(cycle, who, noise, gaps, (smooth, speed))
+    pieces = zip(*(np.split(x, gaps) for x in (t, cycle[who.drive], raw, *started)), strict=True)
     parts = [Part(number + start, *piece) for start, piece in zip(starts.tolist(), pieces, strict=True)]
     for a, b in pairwise(edges.tolist()):
         if any(start <= a < stop for start, stop in rests):
@@ -190,6 +193,37 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
             where = (parts[k], rows.start - int(starts[k]), int(earliest - starts[k]))
             out.append(Window(group, label, *motion, False, None, stretch, (t, cycle[who.drive]), *where))
     return out
+
+
+def _start_states(
+    cycle: Cycle, who: Roles, noise: dict[str, Noise], gaps: NDArray[np.int_], smooth: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Position and speed from which windows may begin, smoothed no wider than the motion is a local quadratic.
+
+    A torque that varies within a few samples, as cogging of a light rotor, bends speed by more than its noise: what
+    smoothing takes off it is no deviation that noise makes, and grows in the window.
+    """
+    position, speed = smooth
+    if who.position is not None:
+        x, sigma = cycle[who.position], noise[who.position].rms(speed)
+        position = _smooth(x, gaps, _width(x, gaps, sigma, WIDTHS))
+        if who.speed is None:
+            speed = _smooth(x, gaps, _width(x, gaps, sigma, tuple(2 * n - 1 for n in WIDTHS)), cycle.period)
+    if who.speed is not None:
+        x = cycle[who.speed]
+        speed = _smooth(x, gaps, _width(x, gaps, noise[who.speed].rms(np.gradient(speed, cycle["t"])), WIDTHS))
+    return position, speed
+
+
+def _width(x: Array, gaps: NDArray[np.int_], sigma: Array, widths: tuple[int, ...]) -> int:
+    """The widest local quadratic that leaves no more than noise in most parts of a cycle, or the narrowest."""
+    for width in widths[:-1]:
+        left = (x - _smooth(x, gaps, width)) / np.maximum(sigma, TINY)
+        parts = np.array_split(left**2, max(1, len(x) // (4 * width)))
+        of_noise = 1.0 - savgol_coeffs(width, 2)[width // 2]
+        if np.median([part.mean() for part in parts]) < (1.0 + ESTIMATE_UNCERTAINTY) ** 2 * of_noise:
+            return width
+    return widths[-1]
 
 
 def _smooth(x: Array, gaps: NDArray[np.int_], width: int, dt: float | None = None) -> Array:

@@ -78,3 +78,29 @@ def test_a_slow_signal_in_coarse_steps_is_as_noisy_as_its_steps():
     counted = 0.1 * np.round((true + 0.015 * np.random.default_rng(2).standard_normal(len(T))) / 0.1)
     found = estimate((Cycle(0, {"t": T, "u_q": counted}),), "u_q", None).rms(np.gradient(true, T))
     assert np.sqrt(np.mean(found**2)) == pytest.approx(np.sqrt(np.mean((counted - true) ** 2)), rel=0.15)
+
+
+def swinging(frequency):
+    """A steady motion with a swing of 80 Hz or less, and noise: what a light rotor does beside cogging."""
+    a = 2.0 / frequency
+    rng = np.random.default_rng(3)
+    true = {"theta_m": 20.0 * T + a * np.sin(frequency * T), "w_m": 20.0 + 2.0 * np.cos(frequency * T)}
+    noise = {"theta_m": 1e-4, "w_m": 0.05}
+    noisy = {name: x + noise[name] * rng.standard_normal(len(T)) for name, x in true.items()}
+    plant = PLANT.model_copy(update={"noise": noise})
+    (part,) = {
+        w.part.number: w.part
+        for w in bench(plant, Record((Cycle(0, {"t": T, "i_q": 0.1 * T, **noisy}),)), "one", 0.1).windows
+    }.values()
+    return part, true, noise
+
+
+@pytest.mark.parametrize(("frequency", "narrower"), [(500.0, True), (20.0, False)])
+def test_a_window_begins_where_the_axis_was_however_quickly_it_swings(frequency, narrower):
+    """Over eleven samples a local quadratic takes half off a swing of 80 Hz: 20 deviations of the speed's noise."""
+    part, true, noise = swinging(frequency)
+    inside = slice(20, -20)
+    off = np.std((part.speed - true["w_m"])[inside]) / noise["w_m"]
+    assert off < 2.0
+    assert np.std((part.position - true["theta_m"])[inside]) / noise["theta_m"] < 2.0
+    assert narrower or off < 0.6  # eleven samples: a third to a half of the noise
