@@ -29,7 +29,7 @@ SCREENED = (
 )
 ROOM = 10.0  # times the size that the regression found, to which a fit may go
 FIXED = (  # parameters that the records of one bench hardly show
-    *("turns", "centre", "half", "over", "since", "coefficient", "damping"),
+    *("turns", "centre", "half", "over", "since", "coefficient", "damping", "shape"),
 )
 
 
@@ -72,6 +72,8 @@ def _candidate(name: str, values: dict[str, float], unsure: dict[str, float]) ->
             free.append(Free(f"{name}.{p.name}", p.unit, value - np.pi, value + np.pi, value, 0.1))
         else:
             size = max(abs(value), unsure.get(p.name, 0.0))
+            if size == 0.0:
+                continue  # nothing says how far it may go
             low = 0.0 if p.low == 0.0 else -ROOM * size
             free.append(Free(f"{name}.{p.name}", p.unit, low, ROOM * size, value, 0.1 * size))
     start = {f"{name}.{key}": value for key, value in values.items()}

@@ -10,6 +10,8 @@ import pytest
 
 from ema.core.records import Cycle
 from ema.discrepancy.axis.gear import DAMPING, gear_candidate
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.fitting import fit
 from ema.models.axis_config import RotaryAxis
 
 SHARE, RESONANCE = 0.5, 11.0  # of the inertia, behind the gear; [Hz] of the load against a motor that is held
@@ -41,9 +43,26 @@ def test_the_resonance_is_looked_for_where_it_is(resonating):
     (start,) = found.starts
     c, J_l = start["gear_compliance.compliance"], start["gear_compliance.inertia"]
     assert 1.0 / (2.0 * np.pi * np.sqrt(c * J_l)) == pytest.approx(RESONANCE, rel=0.25)
-    assert all(f.low < start[f.name] < f.high for f in found.free)
+    within = {f.name: f.low < start[f.name] < f.high for f in found.free}
+    assert all(is_within for name, is_within in within.items() if not name.endswith("friction"))  # that may be none
     without, there = (resonating.residuals([point], on_paper.everywhere(resonating))[0] for point in (AT, AT | start))
     assert sum(float((r**2).sum()) for r in there) < 0.5 * sum(float((r**2).sum()) for r in without)
+
+
+@pytest.mark.parametrize("behind", [0.016, 0.0])
+def test_dry_friction_is_told_on_its_side_of_the_gear(support, behind):
+    """At rest it holds a twist, and lets it go later than the motor begins: all of it at the motor, nothing is seen."""
+    belt = support("belt_bench")
+    file = {"J": belt.J_M + belt.J_L, "F_d": belt.F_M + belt.F_L, "C": belt.C, "k_t": belt.K_T}
+    plant = AxisPlant(RotaryAxis.model_validate(file), [belt.record(behind)], n_threads=1)
+    every, at = on_paper.everywhere(plant), {"F_d": file["F_d"]}
+    found = gear_candidate(plant, at, every)
+    fitted = fit(plant, [*plant.base, *found.free], {**at, **found.starts[0]}, every, max_iterations=30)
+    value = {name.removeprefix("gear_compliance."): x for name, x in fitted.point.items()}
+    assert value["compliance"] == pytest.approx(1.0 / belt.STIFFNESS, rel=0.1)
+    assert value["inertia"] == pytest.approx(belt.J_L, rel=0.1)
+    assert value["friction"] == pytest.approx(behind, abs=0.15 * belt.F_L)
+    assert value["F_d"] + value["friction"] == pytest.approx(file["F_d"], rel=0.05)
 
 
 def test_where_it_may_not_be_it_is_not_looked_for(resonating):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from ema.discrepancy.axis.screened import suggest_by_balance
+from ema.discrepancy.axis.screened import begin_at, suggest_by_balance
 
 MOTOR, LOAD = "quadratic_load_friction", "quadratic_output_load_friction"
 
@@ -37,3 +37,10 @@ def test_it_is_begun_where_it_was_fitted_itself(plant):
 
 def test_what_a_model_has_is_not_tried_again(plant):
     assert set(tried(plant, plant.balance, {f"{MOTOR}.per_square": 1.0})) == {LOAD}
+
+
+def test_what_a_law_has_at_zero_is_held():
+    """An exponential fall of friction has the shape 0: a fit that may move it by nothing has no slope there."""
+    law = begin_at("stribeck", {"excess": 0.4, "speed": 2.4, "shape": 0.0}, {})
+    assert {f.name for f in law.free} == {"stribeck.excess", "stribeck.speed"}
+    assert law.starts[0]["stribeck.shape"] == 0.0
