@@ -145,7 +145,15 @@ def back_emf(KV: float) -> float:
 
 
 def _constants(sheet: Sheet) -> tuple[float, float, str]:
-    """k_t, k_e and where they are from: KV is of the line-to-line voltage, currents are amplitude-invariant."""
+    """k_t, k_e on the side of the gear where position and speed are, and where they are from."""
+    k_t, k_e, whence = _of_motor(sheet)
+    if sheet.measured_at != "load" or sheet.gear is None or (sheet.k_t is None and sheet.KV is None):
+        return k_t, k_e, whence
+    return sheet.gear * k_t, sheet.gear * k_e, f"{whence}, times the gear: at the load"
+
+
+def _of_motor(sheet: Sheet) -> tuple[float, float, str]:
+    """Of the motor itself: KV is of the line-to-line voltage, currents are amplitude-invariant."""
     if sheet.k_t is not None:
         return sheet.k_t, sheet.k_t if sheet.brushed else sheet.k_t / 1.5, "data sheet"
     if sheet.KV is not None and sheet.brushed:

@@ -14,6 +14,7 @@ _COMMAND = {
     "ref", "reference", "cmd", "command", "commanded", "target", "goal", "desired", "des", "set", "setpoint", "demand",
     "soll",
 }  # fmt: skip
+_MEASURED = {"present", "actual", "act", "measured", "meas", "ist"}
 _SUPPLY = {"dc", "bus", "supply", "vbus", "udc", "vdc", "battery", "batt", "vsupply"}
 _OUTPUT = {"user", "output", "load", "lvdt", "surface", "ram"}
 _PHASE = {"a": "i_a", "b": "i_b", "c": "i_c", "u": "i_a", "v": "i_b", "w": "i_c"}
@@ -60,11 +61,13 @@ def propose(table: Table) -> list[Proposal]:
     seen = [_quantity(title, table.units.get(index)) for index, title in enumerate(table.header)]
     is_linear = any(what in ("length", "force", "speed") for what, _ in seen)
     is_actuator = sum(_PHASES.search(_plain(title)) is not None for title in table.header) >= 2
+    of_supply = any(what == "duty" for what, _ in seen)  # a share of it: then a voltage is the supply's
     taken: dict[str, str] = {}
     found: dict[int, Proposal] = {}
     for index in sorted(range(len(seen)), key=lambda k: _is_commanded_drive(table.header[k], seen[k][0])):
         title, (what, unit) = table.header[index], seen[index]
         channel = _channel(title, what, is_linear and unit is None, is_actuator)
+        channel = "u_dc" if channel == "u_q" and of_supply else channel
         if channel is not None and (said := _of_its_own_scale(title, table.units.get(index), channel)):
             found[index] = Proposal(title, None, None, said)
         elif channel is None:
@@ -126,7 +129,7 @@ def _quantity(title: str, apart: str | None) -> tuple[str | None, str | None]:
     words = _plain(title).split()
     if "rpm" in words:
         return "turning", "rpm"
-    if set(words) & _COMMAND and (ending := _ending(title, "")) is not None:
+    if set(words) & (_COMMAND | _MEASURED) and (ending := _ending(title, "")) is not None:
         return next((what for what, target in _UNITS.items() if _converts(ending, target)), None), ending
     for what, known in _WORDS.items():
         if set(words) & set(known.split()):

@@ -119,3 +119,17 @@ def test_where_a_torque_behind_a_gear_was_measured_is_asked_for(tmp_path):
     said = axis_config.load(init(record, tmp_path, "--gear", "50", "--torque-at", "load"))
     assert (said.torque_at, said.measured_at) == ("load", "motor")
     assert pytest.approx(J, rel=0.05) == said.J
+
+
+def test_constants_of_the_motor_are_those_at_the_load_where_the_motion_was_measured_there(tmp_path):
+    """N times k_t and k_e, and so N^2 times the inertia: a servo tells the angle of its horn."""
+    N, R = 20.0, 0.8
+    (cycle,) = bench().cycles
+    channels = {"t": cycle["t"], "theta_m": cycle["theta_m"] / N, "w_m": cycle["w_m"] / N}
+    channels["u_q"] = R * cycle["i_q"] + K_T * cycle["w_m"]
+    options = ("--k-t", str(K_T), "--R", str(R), "--brushed", "--gear", str(N), "--measured-at", "load")
+    plant = axis_config.load(init(Record((Cycle(0, channels),)), tmp_path, *options))
+    assert plant.k_e == plant.k_t == pytest.approx(N * K_T)
+    assert pytest.approx(N**2 * J, rel=0.05) == plant.J
+    assert pytest.approx(N * F_D, rel=0.3) == plant.F_d
+    assert pytest.approx(N**2 * C, rel=0.3) == plant.C

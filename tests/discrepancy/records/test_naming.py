@@ -34,6 +34,13 @@ def channels(answer):
     ("titles", "units", "wanted"),
     [
         (
+            "timestamp,goal_deg,present_deg,pwm_percent,voltage", "",
+            {
+                "timestamp": ("t", "s"), "goal_deg": ("theta_ref", "deg"), "present_deg": ("theta_m", "deg"),
+                "pwm_percent": ("duty", "%"), "voltage": ("u_dc", "V"),
+            },
+        ),
+        (
             "Time [ms],Position [mm],Force [N]", "",
             {"Time [ms]": ("t", "ms"), "Position [mm]": ("q", "mm"), "Force [N]": ("force", "N")},
         ),
