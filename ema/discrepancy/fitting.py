@@ -64,7 +64,8 @@ class Fit:
         rng = np.random.default_rng(seed)
         names = [f.name for f in self.free]
         mean = np.array([self.point[name] for name in names])
-        values = rng.multivariate_normal(mean, self.covariance, size=n, method="eigh")
+        # rounding may leave an eigenvalue of a flat direction just below zero
+        values = rng.multivariate_normal(mean, self.covariance, size=n, method="eigh", check_valid="ignore")
         values = np.clip(values, [f.low for f in self.free], [f.high for f in self.free])
         return [{**self.point, **dict(zip(names, row.tolist(), strict=True))} for row in values]
 
