@@ -14,7 +14,7 @@ EFFECT = Effect(
         Parameter("friction", "N m", 0.0, 0.0, 100.0, 1.0, "dry friction at the user"),
     ),
     sentence="the gear train gives {compliance:.2g} rad per N m; with {inertia:.2g} kg m² at the user it resonates",
-    separated_by="fast motion with both θ_m and θ_u measured",
+    separated_by="fast motion with the angles of motor and load both measured",
     mistaken_for=("k2",),
     plants=("ema", "axis"),
     limits={"inertia": POSITIVE, **dict.fromkeys(("compliance", "damping", "drag", "friction"), NOT_NEGATIVE)},
