@@ -106,7 +106,7 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
     trust = {}
     for key, mark in marks.items():
         form = 0.0
-        for o in marks.keys() - {key}:
+        for o in [other for other in marks if other != key]:
             s = _looks_like(made[key], made[o])
             form += s * min(FORM**2 * marks[o], left / max(1.0 - s, 1e-9))
         trust[key] = mark / (mark + unknown + form) if mark > 0.0 else 0.0

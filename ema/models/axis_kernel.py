@@ -95,11 +95,14 @@ def friction(z, lines, terms, theta, w, tau, tau_m, i, t):
 
 
 @njit(inline="always")
-def delayed(t, x, k, delay, slope):
-    """Value of x at t[k] - delay by linear interpolation; before the first sample along `slope`."""
-    at = t[k] - delay
+def delayed(t, x, k, delay, slope, skew):
+    """Value of x a `delay` before t[k] by linear interpolation; before the first sample along `slope`.
+
+    A second is 1 / `skew` seconds of the record's clock.
+    """
+    at = t[k] - delay / skew
     if at <= t[0]:
-        return x[0] + slope * (at - t[0])
+        return x[0] + slope * ((at - t[0]) * skew)
     j = k
     while t[j] > at:
         j -= 1
@@ -110,8 +113,8 @@ def delayed(t, x, k, delay, slope):
 
 @njit(inline="always")
 def delayed_position(t, theta, w, k, delay, slope, skew):
-    """Position at t[k] - delay by the cubic with the speeds; before the first sample under its acceleration `slope`."""
-    at = t[k] - delay
+    """Position then, by the cubic with the speeds; before the first sample under its acceleration `slope`."""
+    at = t[k] - delay / skew
     if at <= t[0]:
         s = (at - t[0]) * skew
         return theta[0] + (w[0] + 0.5 * slope * s) * s
@@ -224,7 +227,6 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
     gain = 1.0 / (1.0 + z[GAIN])
     R_now = z[R] * resistance_factor(z, 0, 1, z[DT])
     skew = 1.0 + z[SKEW]
-    d_w = z[SPEED_DELAY] / skew  # of the recorded clock
     i, i_end, asked, slope, dw = 0.0, 0.0, 0.0, 0.0, 0.0
     if mode == VOLTAGE:
         u = (drive[0] - z[OFFSET]) * gain
@@ -234,7 +236,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
         if mode == CURRENT:
             i = (drive[k] - z[OFFSET]) * gain
         elif mode == SPEED_LOOP:
-            w_meas = delayed(t, out[1], k, d_w, slope * skew)
+            w_meas = delayed(t, out[1], k, z[SPEED_DELAY], slope, skew)
             asked = z[K_W] * (drive[k] - w_meas)
             i = min(max(asked, -z[I_MAX]), z[I_MAX])
         out[2, k] = i
@@ -310,8 +312,8 @@ def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
     for k in range(n - 1, -1, -1):  # backwards, since the undelayed values of earlier samples are still needed
         theta = out[0, k]
         if z[POSITION_DELAY] > 0.0:
-            theta = delayed_position(t, out[0], out[1], k, z[POSITION_DELAY] / skew, slope, skew)
-        w = delayed(t, out[1], k, z[SPEED_DELAY] / skew, slope * skew) if z[SPEED_DELAY] > 0.0 else out[1, k]
+            theta = delayed_position(t, out[0], out[1], k, z[POSITION_DELAY], slope, skew)
+        w = delayed(t, out[1], k, z[SPEED_DELAY], slope, skew) if z[SPEED_DELAY] > 0.0 else out[1, k]
         out[0, k] = theta + angle_error(z, 0, 1, theta) + position_error(z, 0, 1, theta)
         out[1, k] = w * (1.0 + _slope(z, theta, False))
         if mode in (CURRENT, SPEED_LOOP):

@@ -19,21 +19,21 @@ MEMORY = 1.0  # [s] for which a load behind a gear is followed before a window
 
 @dataclass(frozen=True)
 class LedIn:
-    """Windows with up to `n` samples of motion before each; `kept` are the samples that are the windows' own."""
+    """Windows with up to `n` samples of motion before each; `own` are the samples of the windows themselves."""
 
     n: int
     offsets: NDArray[np.int64]
     t: Array
     drive: Array
-    kept: NDArray[np.bool_]
+    own: NDArray[np.bool_] | slice
 
     @classmethod
     def of(cls, windows: list[Window], n: int) -> LedIn:
         """Led in by `n` samples, where the axis was moving by then as it does in the window."""
         t, drive = zip(*(w.led_in(n) for w in windows), strict=True)
-        kept = [np.arange(len(at)) >= len(at) - w.n for at, w in zip(t, windows, strict=True)]
+        own = [np.arange(len(at)) >= len(at) - w.n for at, w in zip(t, windows, strict=True)]
         offsets = np.concatenate(([0], np.cumsum([len(at) for at in t]))).astype(np.int64)
-        return cls(n, offsets, np.concatenate(t), np.concatenate(drive), np.concatenate(kept))
+        return cls(n, offsets, np.concatenate(t), np.concatenate(drive), np.concatenate(own))
 
 
 class Pack:
@@ -52,7 +52,7 @@ class Pack:
         directions = [w.direction for w in windows if w.direction is not None]
         self.direction = np.concatenate(directions) if directions else None
         self.filter = join(filters) if filters else None
-        self._led_in = {0: LedIn.of(windows, 0)}  # and the last other one asked for
+        self._led_in = {0: LedIn(0, self.offsets, self.t, self.drive, slice(None))}  # and the last other one asked for
         self._histories: dict[tuple[float, int], History] = {}  # the last one asked for
 
     def led_in(self, late: float) -> LedIn:
@@ -69,7 +69,7 @@ class Pack:
         return np.concatenate([w.drive_by(clock, led_in.n) for w in self.windows])
 
     def history(self, late: float = 0.0, n: int = 0) -> History:
-        """Motion before `n` samples before each window, since the one before it, of a position that is recorded `late`.
+        """Motion up to `n` samples before each window, since that of the one before, of a position recorded `late`. [s]
 
         Offsets, time, position, speed, and whether it follows.
         """
@@ -81,8 +81,6 @@ class Pack:
         parts, follows = [], []
         number, last = -1, 0.0
         for w in self.windows:
-            if w.part is None:
-                continue
             t, theta, speed = w.part.t, w.part.recorded, w.part.speed
             end = min(t[w.begin(n)] + late, t[-1])
             first = max(end - MEMORY, t[0])

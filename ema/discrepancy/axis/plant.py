@@ -208,7 +208,7 @@ class AxisPlant:
         drive = pack.bench.roles.kind
         record = (led_in.offsets, led_in.t, pack.drive_by(model.z[row("clock_skew.currents")], led_in), starts)
         bristles = self._bristles(pack, model, led_in.n)
-        out = axis.simulate(model, drive, *record, step, pack.dT, pack.slide, self.between, bristles)[:, led_in.kept]
+        out = axis.simulate(model, drive, *record, step, pack.dT, pack.slide, self.between, bristles)[:, led_in.own]
         out[0] -= zero
         return out[[_KERNEL_ROW[name] for name in pack.bench.roles.outputs]]
 
@@ -273,11 +273,10 @@ class AxisPlant:
         if pack.bench.roles.speed is None:
             late_w = late_theta
         for place, w in enumerate(pack.windows):
-            if w.part is not None:
-                k = w.begin(n)
-                t, theta, speed = (x[k:] for x in (w.part.t, w.part.position, w.part.speed))
-                starts[place, 0] = theta[0] if late_theta == 0.0 else np.interp(t[0] + late_theta, t, theta)
-                starts[place, 1] = speed[0] if late_w == 0.0 else np.interp(t[0] + late_w, t, speed)
+            k = w.begin(n)
+            t, theta, speed = (x[k:] for x in (w.part.t, w.part.position, w.part.speed))
+            starts[place, 0] = theta[0] if late_theta == 0.0 else np.interp(t[0] + late_theta, t, theta)
+            starts[place, 1] = speed[0] if late_w == 0.0 else np.interp(t[0] + late_w, t, speed)
         if axis.is_flexible(model):
             starts[:, 2:] = starts[:, :2] - axis.loads_after(model, *pack.history(late_theta, n), step)
         starts[:, :2] = axis.true_state(model, starts[:, :2], derived=pack.bench.roles.speed is None)

@@ -45,6 +45,9 @@ class Part:
     speed: Array
 
 
+NO_PART = Part(-1, *(np.empty(0) for _ in range(5)))  # of readings at rest
+
+
 @dataclass(frozen=True)
 class Window:
     """Consecutive samples of one cycle, in arrays of shape (n_times,).
@@ -66,7 +69,7 @@ class Window:
     direction: Array | None = None
     stretch: int = 0
     course: tuple[Array, Array] = (np.empty(0), np.empty(0))
-    part: Part | None = None
+    part: Part = NO_PART
     first: int = 0
     earliest: int = 0
 
@@ -86,7 +89,7 @@ class Window:
 
     def led_in(self, n: int) -> tuple[Array, Array]:
         """Time and drive of the window and up to `n` samples before it."""
-        if self.part is None or n == 0:
+        if n == 0:
             return self.t, self.drive
         rows = slice(self.begin(n), self.first + self.n)
         return self.part.t[rows], self.part.drive[rows]
@@ -190,8 +193,11 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
             motion = (t[rows], cycle[who.drive][rows], outputs, smooth[rows], speed[rows], float(np.mean(warmer[rows])))
             k = int(np.searchsorted(starts, a, side="right")) - 1
             earliest = anew[np.searchsorted(anew, rows.start, side="right") - 1]
-            where = (parts[k], rows.start - int(starts[k]), int(earliest - starts[k]))
-            out.append(Window(group, label, *motion, False, None, stretch, (t, cycle[who.drive]), *where))
+            first, since = rows.start - int(starts[k]), int(earliest - starts[k])
+            course, part = (t, cycle[who.drive]), parts[k]
+            out.append(
+                Window(group, label, *motion, stretch=stretch, course=course, part=part, first=first, earliest=since)
+            )
     return out
 
 

@@ -61,13 +61,12 @@ def propose(table: Table) -> list[Proposal]:
     seen = [_quantity(title, table.units.get(index)) for index, title in enumerate(table.header)]
     is_linear = any(what in ("length", "force", "speed") for what, _ in seen)
     is_actuator = sum(_PHASES.search(_plain(title)) is not None for title in table.header) >= 2
-    of_supply = any(what == "duty" for what, _ in seen)  # a share of it: then a voltage is the supply's
+    has_duty = any(what == "duty" for what, _ in seen)
     taken: dict[str, str] = {}
     found: dict[int, Proposal] = {}
     for index in sorted(range(len(seen)), key=lambda k: _is_commanded_drive(table.header[k], seen[k][0])):
         title, (what, unit) = table.header[index], seen[index]
-        channel = _channel(title, what, is_linear and unit is None, is_actuator)
-        channel = "u_dc" if channel == "u_q" and of_supply else channel
+        channel = _channel(title, what, is_linear and unit is None, is_actuator, has_duty)
         if channel is not None and (said := _of_its_own_scale(title, table.units.get(index), channel)):
             found[index] = Proposal(title, None, None, said)
         elif channel is None:
@@ -163,8 +162,11 @@ def _converts(unit: str, target: str) -> bool:
     return True
 
 
-def _channel(title: str, what: str | None, is_linear: bool, is_actuator: bool) -> str | None:
-    """The channel; `is_linear`: a position or speed without a unit is of a linear axis, since others are."""
+def _channel(title: str, what: str | None, is_linear: bool, is_actuator: bool, has_duty: bool) -> str | None:
+    """The channel; `is_linear`: a position or speed without a unit is of a linear axis, since others are.
+
+    `has_duty`: a voltage beside a duty cycle is that of the supply, of which it is a share.
+    """
     words = set(_plain(title).split())
     is_command = bool(words & _COMMAND)
     is_linear = is_linear or what in ("length", "speed", "force")
@@ -179,7 +181,7 @@ def _channel(title: str, what: str | None, is_linear: bool, is_actuator: bool) -
             return None if is_linear else "w_ref"
         return "v" if is_linear else "w_m"
     if what == "voltage":
-        return "u_dc" if words & _SUPPLY else "u_q"
+        return "u_dc" if words & _SUPPLY or has_duty else "u_q"
     if words & _SUPPLY:  # its current is not the motor's
         return None
     if what == "current" and (phase := _PHASES.search(_plain(title))) and is_actuator:
