@@ -14,13 +14,18 @@ from ema.models import actuator_file
 ROW = {"commit": "a" * 40, "outcome": "refused", "stratum": "one effect", "number": 0, "seed": 3}
 
 
+@pytest.fixture(scope="module")
+def truth():
+    """The trial of ROW."""
+    return strata_axis.drawn("one effect", 0, 3)
+
+
 @pytest.fixture
-def checkout(tmp_path):
+def checkout(tmp_path, truth):
     """A commit whose finder names viscous drag where the inertia in the plant file is what it was told."""
     folder = tmp_path / "old"
     (folder / ".venv/bin").mkdir(parents=True)
-    trial = strata_axis.drawn("one effect", 0, 3)
-    J = float(trial.plant_file.get("J", trial.plant_file.get("m", 0.0)))
+    J = float(truth.plant_file.get("J", truth.plant_file.get("m", 0.0)))
     command = folder / ".venv/bin/ema"
     command.write_text(
         f"""#!/usr/bin/env python3
@@ -47,14 +52,13 @@ said = {{"verdict": "explained", "effects": [effect], "structure": {{}}, "gain":
     return folder
 
 
-def test_what_the_other_commit_says_stands_beside_what_was_hidden(tmp_path, checkout):
+def test_what_the_other_commit_says_stands_beside_what_was_hidden(tmp_path, checkout, truth):
     rows, out = tmp_path / "rows.jsonl", tmp_path / "out.jsonl"
     rows.write_text(json.dumps(ROW) + "\n", encoding="utf-8")
     for _ in range(2):  # what is there is not done again
         told = CliRunner().invoke(other_commit.main, [str(rows), "--checkout", str(checkout), "--out", str(out)])
         assert told.exit_code == 0, told.output
     (row,) = frozen.read_rows(out)
-    truth = strata_axis.drawn("one effect", 0, 3)
     assert row["commit"] == frozen.commit(checkout) != ROW["commit"]
     assert row["effects"] == list(truth.effects)
     assert row["hidden"] == truth.truth

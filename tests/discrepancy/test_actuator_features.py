@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 
 import numpy as np
 import pytest
@@ -70,6 +71,12 @@ def nothing_is_noise(plant, record: Record) -> bool:
     return judge(noise, [left[c] for c in cycles], cycles, nothing_free, 1.0 / 16).is_noise
 
 
+@pytest.fixture(scope="module")
+def two(hidden):
+    """Two cycles by the second simulator, of each seed and set of flaws once."""
+    return cache(lambda seed=4, **flaws: hidden.cycles(hidden.Flaws(**flaws), 2, seed))
+
+
 def prepared(plant, cycles):
     return prepare(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
 
@@ -133,14 +140,13 @@ def test_drag_and_friction_at_the_user_do_not_hide_its_resonance(hidden, shipped
 @pytest.mark.parametrize(
     "flaws", [{}, {"k2": 0.1}, {"load": 3.0}, {"spring": 1500.0, "holding": 0.5}, {"position_delay": 1e-3}]
 )
-def test_a_stiff_gear_has_no_resonance(hidden, shipped_plant, flaws):
-    stiff = hidden.cycles(hidden.Flaws(**flaws), 2, 1)
-    assert find_resonance(shipped_plant, prepared(shipped_plant, stiff)) is None
+def test_a_stiff_gear_has_no_resonance(two, shipped_plant, flaws):
+    assert find_resonance(shipped_plant, prepared(shipped_plant, two(seed=1, **flaws))) is None
 
 
-def test_the_control_balance_of_a_sound_actuator_is_small(hidden, shipped_plant):
+def test_the_control_balance_of_a_sound_actuator_is_small(two, shipped_plant):
     """Σ over phases by the sector the rotor is in, less what the controller asks for: ripple and the limit are left."""
-    data = prepared(shipped_plant, hidden.cycles(hidden.Flaws(), 2, 4))
+    data = prepared(shipped_plant, two())
     for s in data.signals:
         found = f.features(shipped_plant, s)
         assert np.sqrt(np.mean(found["control"] ** 2)) < 0.1
@@ -148,25 +154,23 @@ def test_the_control_balance_of_a_sound_actuator_is_small(hidden, shipped_plant)
 
 
 @pytest.mark.parametrize("change", [-0.3, -0.1, 0.2])
-def test_other_gains_of_the_controller_are_read_from_the_record(hidden, shipped_plant, change):
-    data = prepared(shipped_plant, hidden.cycles(hidden.Flaws(speed_gain=change), 2, 4))
+def test_other_gains_of_the_controller_are_read_from_the_record(two, shipped_plant, change):
+    data = prepared(shipped_plant, two(speed_gain=change))
     assert fit_gains(shipped_plant, data.signals) == pytest.approx((1.0, 1.0 + change), abs=0.03)
     control = shipped_plant.control.model_copy(update={"K_p": shipped_plant.control.K_p / (1.0 + change)})
     other = shipped_plant.model_copy(update={"control": control})
-    data = prepared(other, hidden.cycles(hidden.Flaws(), 2, 4))
+    data = prepared(other, two())
     assert fit_gains(other, data.signals) == pytest.approx((1.0 + change, 1.0), abs=0.03)
 
 
 @pytest.mark.parametrize("flaws", [{}, {"viscous": 1e-4}, {"k3": 0.3}, {"position_delay": 1e-3}, {"reaction": 3e-6}])
-def test_what_is_no_controller_is_not_taken_for_other_gains(hidden, shipped_plant, flaws):
-    assert fit_gains(shipped_plant, prepared(shipped_plant, hidden.cycles(hidden.Flaws(**flaws), 2, 4)).signals) is None
+def test_what_is_no_controller_is_not_taken_for_other_gains(two, shipped_plant, flaws):
+    assert fit_gains(shipped_plant, prepared(shipped_plant, two(**flaws)).signals) is None
 
 
-def rests_of_control(plant, hidden, flaws):
+def rests_of_control(plant, two, flaws):
     """What the actuator without flaws, of other switching instants, leaves of the currents of one with them."""
-    made, sound = (
-        prepared(plant, hidden.cycles(hidden.Flaws(**has), 2, seed)).signals for has, seed in ((flaws, 4), ({}, 9))
-    )
+    made, sound = (prepared(plant, cycles).signals for cycles in (two(**flaws), two(seed=9)))
     return [
         (a, (f.features(plant, a)["control"] - f.features(plant, b)["control"])[0])
         for a, b in zip(made, sound, strict=True)
@@ -174,8 +178,8 @@ def rests_of_control(plant, hidden, flaws):
 
 
 @pytest.mark.parametrize("deadband", [1e-4, 2e-4])
-def test_a_controller_that_ignores_small_errors_is_told_by_the_error_it_ignores(hidden, shipped_plant, deadband):
-    found = fit_function_of_error(shipped_plant, rests_of_control(shipped_plant, hidden, {"deadband": deadband}))
+def test_a_controller_that_ignores_small_errors_is_told_by_the_error_it_ignores(two, shipped_plant, deadband):
+    found = fit_function_of_error(shipped_plant, rests_of_control(shipped_plant, two, {"deadband": deadband}))
     assert found is not None
     (sentence,) = describe_function_of_error(found)
     told = re.search(r"as if errors below (\S+) rad were ignored", sentence)
@@ -186,8 +190,8 @@ def test_a_controller_that_ignores_small_errors_is_told_by_the_error_it_ignores(
 @pytest.mark.parametrize(
     "flaws", [{}, {"viscous": 1e-4}, {"position_delay": 1e-3}, {"speed_gain": -0.2}, {"k3": 0.3}, {"gain_a": 0.05}]
 )
-def test_what_is_no_law_of_the_error_is_not_taken_for_one(hidden, shipped_plant, flaws):
-    assert fit_function_of_error(shipped_plant, rests_of_control(shipped_plant, hidden, flaws)) is None
+def test_what_is_no_law_of_the_error_is_not_taken_for_one(two, shipped_plant, flaws):
+    assert fit_function_of_error(shipped_plant, rests_of_control(shipped_plant, two, flaws)) is None
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,6 +26,12 @@ def plant():
 @pytest.fixture(scope="module")
 def nominal(plant):
     return hf.simulate(plant, np.zeros(6), noise=False)
+
+
+@pytest.fixture(scope="module")
+def without(plant):
+    """Sixteen runs without an effect, of a command so many times the plant's own."""
+    return cache(lambda times: hf.simulate(plant, np.zeros((16, 6)), times * plant.command(), seeds=np.arange(16)))
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
@@ -77,14 +84,13 @@ def test_neutral_values_leave_the_record_as_it_is(effect, plant, nominal, monkey
 
 
 @pytest.mark.parametrize("effect", [e for e in EFFECTS if "ema" in e.plants], ids=lambda e: e.name)
-def test_start_values_change_the_record(effect, plant):
+def test_start_values_change_the_record(effect, plant, without):
     """An effect that changes nothing cannot be found: at its start value it must be seen in some recorded channel."""
     start = {p.name: p.start for p in effect.parameters}
     commands = {"winding_resistance": 3.0, "supply_sag": 3.0, "adc_saturation": 2.0}
-    command = commands.get(effect.name, 1.0) * plant.command()
-    seeds = np.arange(16)
-    a = hf.simulate(plant, np.zeros((16, 6)), command, seeds=seeds)
-    b = hf.simulate(plant, np.zeros((16, 6)), command, seeds=seeds + 100, effects={effect.name: start})
+    times = commands.get(effect.name, 1.0)
+    a, seeds = without(times), 100 + np.arange(16)
+    b = hf.simulate(plant, np.zeros((16, 6)), times * plant.command(), seeds=seeds, effects={effect.name: start})
 
     def distance(channel):
         x, y = getattr(a, channel), getattr(b, channel)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from ema_offline_builder.config import Builder
@@ -94,16 +96,21 @@ def test_no_nuisance_changes_nothing():
     assert plain.nuisance is None
 
 
-def cycles(hidden, bundle, n=6, seed=3, **flaws):
-    """Measurements of an actuator simulated by other code."""
+@pytest.fixture(scope="module")
+def recorded(hidden):
+    """Six cycles of an actuator simulated by other code, of each set of flaws once."""
+    return cache(lambda **flaws: hidden.cycles(hidden.Flaws(**flaws), 6, 3, motions=(hidden.chirp(),)))
+
+
+def measured(cycles, bundle):
+    """What a bundle's schedule takes of recorded cycles."""
     rate, GR = bundle.plant.control.rate, bundle.plant.transmission.GR
-    found = hidden.cycles(hidden.Flaws(**flaws), n, seed, motions=(hidden.chirp(),))
     return [
         Measurement.complete(
             envelope(np.array([c["i_a"], c["i_b"], c["i_c"]]), rate)[bundle.schedule],
             np.array([c["theta_u"][0], c["theta_m"][0] / GR]),
         )
-        for c in found
+        for c in cycles
     ]
 
 
@@ -112,12 +119,12 @@ def err_k(estimates, k):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_weaker_magnet_is_no_longer_three_shorts(hidden, coarse_bundle, flux_bundle, method):
+def test_a_weaker_magnet_is_no_longer_three_shorts(recorded, coarse_bundle, flux_bundle, method):
     """Hidden by other code: flux -6.6 %, friction 4 %."""
     k = np.array([0.04, 0, 0, 0, 0, 0])
     flaws = {"flux": -0.066, "k1": 0.04}
-    nominal = [identifier(method, coarse_bundle).estimate(m) for m in cycles(hidden, coarse_bundle, **flaws)]
-    carried = [identifier(method, flux_bundle).estimate(m) for m in cycles(hidden, flux_bundle, **flaws)]
+    nominal = [identifier(method, coarse_bundle).estimate(m) for m in measured(recorded(**flaws), coarse_bundle)]
+    carried = [identifier(method, flux_bundle).estimate(m) for m in measured(recorded(**flaws), flux_bundle)]
     flux = np.array([e.nuisance.value[0] for e in carried])
     limits = np.array([e.nuisance.interval95[0] for e in carried])
     print(f"{method}: err_k {err_k(nominal, k):.4f} -> {err_k(carried, k):.4f}; "
@@ -129,11 +136,11 @@ def test_a_weaker_magnet_is_no_longer_three_shorts(hidden, coarse_bundle, flux_b
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_three_real_shorts_are_not_explained_away_in_silence(hidden, coarse_bundle, flux_bundle, method):
+def test_three_real_shorts_are_not_explained_away_in_silence(recorded, coarse_bundle, flux_bundle, method):
     k = np.array([0, 0, 0.06, 0.06, 0.06, 0])
     flaws = {"k3": 0.06, "k4": 0.06, "k5": 0.06}
-    nominal = [identifier(method, coarse_bundle).estimate(m) for m in cycles(hidden, coarse_bundle, **flaws)]
-    carried = [identifier(method, flux_bundle).estimate(m) for m in cycles(hidden, flux_bundle, **flaws)]
+    nominal = [identifier(method, coarse_bundle).estimate(m) for m in measured(recorded(**flaws), coarse_bundle)]
+    carried = [identifier(method, flux_bundle).estimate(m) for m in measured(recorded(**flaws), flux_bundle)]
     width = [np.mean([np.ptp(e.interval(0.95)[2:5], axis=1) for e in some]) for some in (nominal, carried)]
     inside = np.array([[low <= 0.06 <= high for low, high in e.interval(0.95)[2:5]] for e in carried])
     covered = inside.mean()

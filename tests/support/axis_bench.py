@@ -77,8 +77,9 @@ def record(bench: Bench, rng: np.random.Generator, *, duration: float = 1.5, mot
     h = STEP
     theta = rng.uniform(0.0, 2.0 * np.pi, n_cycles)
     w = np.zeros(n_cycles)
-    load = np.stack([theta, w])
+    load, load_w = theta, w
     i = np.zeros(n_cycles)
+    has_load = bench.J_load > 0.0
     kept = {name: np.empty((n, n_cycles)) for name in ("theta", "w", "i", "u")}
     late = round(0.02 / STEP)
     history = {"theta": np.tile(theta, (late, 1)), "w": np.tile(w, (late, 1))}
@@ -92,7 +93,7 @@ def record(bench: Bench, rng: np.random.Generator, *, duration: float = 1.5, mot
         if k % ratio == 0:
             w_ref = (constant + amplitude * np.sin(2.0 * np.pi * frequency * t + phase)) * min(1.0, t / 0.1)
             i_new = bench.K_w * (w_ref - w) * 8.0
-            i_new = np.clip(i_new, -4.0, 4.0)
+            i_new = np.minimum(np.maximum(i_new, -4.0), 4.0)
             slope = (i_new - i) / PERIOD  # the current follows within one period
             s = k // ratio
             th, om = delayed("theta", bench.theta_late, k), delayed("w", bench.w_late, k)
@@ -102,13 +103,16 @@ def record(bench: Bench, rng: np.random.Generator, *, duration: float = 1.5, mot
             u = bench.R * i + bench.L * slope + bench.k_e * bench.emf_factor(i) * w
             kept["u"][s] = bench.voltage(u, i)
         i_mid = i + 0.5 * h * slope
-        a, pull = _acceleration(bench, theta, w, i_mid, t, load)
+        twisting = bench.shaft(theta - load, w - load_w) if has_load else 0.0
+        a = _acceleration(bench, theta, w, i_mid, t, twisting)
         w_half = w + 0.5 * h * a
         w_half = np.where(w * w_half < 0.0, 0.0, w_half)
         theta_half = theta + 0.5 * h * w
-        load_half = load + 0.5 * h * np.stack([load[1], pull])
-        a, pull = _acceleration(bench, theta_half, w_half, i_mid, t + 0.5 * h, load_half)
-        load = load + h * np.stack([load_half[1], pull])
+        if has_load:
+            load_half, load_w_half = load + 0.5 * h * load_w, load_w + 0.5 * h * (twisting / bench.J_load)
+            twisting = bench.shaft(theta_half - load_half, w_half - load_w_half)
+            load, load_w = load + h * load_w_half, load_w + h * (twisting / bench.J_load)
+        a = _acceleration(bench, theta_half, w_half, i_mid, t + 0.5 * h, twisting)
         w_next = w + h * a
         w_next = np.where(w * w_next < 0.0, 0.0, w_next)
         theta = theta + 0.5 * h * (w + w_next)
@@ -124,17 +128,14 @@ def record(bench: Bench, rng: np.random.Generator, *, duration: float = 1.5, mot
     return Record(tuple(cycles))
 
 
-def _acceleration(bench: Bench, theta, w, i, t, load):
-    """Of the motor, and of what hangs at its shaft."""
-    twisting = bench.shaft(theta - load[0], w - load[1]) + 0.0 * w
+def _acceleration(bench: Bench, theta, w, i, t, twisting):
+    """Of the motor, whose shaft takes the torque `twisting`."""
     tau = bench.k_t * bench.torque_factor(i) * i - bench.C * w - bench.torque(theta, w, i, t) - twisting
     resting = np.abs(w) < REST
     direction = np.where(resting, np.sign(tau), np.sign(w))
     factor = bench.friction(theta, w, i, t, direction)
-    sliding = tau - bench.F_d * factor * direction
-    held = np.abs(tau) <= bench.F_s * factor
-    a = np.where(resting & held, -w / STEP, sliding) / np.where(resting & held, 1.0, bench.J)
-    return a, twisting / max(bench.J_load, 1e-12)
+    is_held = resting & (np.abs(tau) <= bench.F_s * factor)
+    return np.where(is_held, -w / STEP, (tau - bench.F_d * factor * direction) / bench.J)
 
 
 PLANT = {

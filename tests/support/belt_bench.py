@@ -16,7 +16,7 @@ MOVES = ((0.3, 1.3, 20.0), (1.5, 2.2, -35.0), (2.4, 3.6, 60.0), (3.8, 4.5, -12.0
 NOISE = {"i_q": 6e-3, "theta_m": 2e-4, "w_m": 0.04}
 
 
-@njit
+@njit(cache=True)
 def _run(reference, stiffness, damping, behind, out):
     theta, w, theta_l, w_l, asked = 0.0, 0.0, 0.0, 0.0, 0.0
     h = 1.0 / (RATE * STEPS)

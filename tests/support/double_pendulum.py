@@ -30,46 +30,58 @@ class Arm:
 
 
 @njit(cache=True)
-def _mass(q, p):
+def _mass(q1, q2, p):
+    """Mass matrix: of the shoulder, coupling, of the elbow. In scalars: a matrix product takes seconds to compile."""
     m1, m2, l1, r1, r2, I1, I2, rotor, gear = p
-    M = np.zeros((2, 2))
-    s1, c1, s12, c12 = np.sin(q[0]), np.cos(q[0]), np.sin(q[0] + q[1]), np.cos(q[0] + q[1])
-    J1 = np.array([[r1 * c1, 0.0], [r1 * s1, 0.0]])
-    J2 = np.array([[l1 * c1 + r2 * c12, r2 * c12], [l1 * s1 + r2 * s12, r2 * s12]])
-    M += m1 * J1.T @ J1 + m2 * J2.T @ J2
-    M[0, 0] += I1
-    M += I2 * np.ones((2, 2))
-    for turns in (np.array([gear, 0.0]), np.array([1.0, -gear])):  # the elbow's rotor turns against its joint
-        M += rotor * np.outer(turns, turns)
-    return M
+    s1, c1, s12, c12 = np.sin(q1), np.cos(q1), np.sin(q1 + q2), np.cos(q1 + q2)
+    # columns of the Jacobians: of the first centre by the shoulder, of the second by the shoulder and by the elbow
+    ax, ay = r1 * c1, r1 * s1
+    bx, by = l1 * c1 + r2 * c12, l1 * s1 + r2 * s12
+    cx, cy = r2 * c12, r2 * s12
+    shoulder = m1 * (ax * ax + ay * ay) + m2 * (bx * bx + by * by) + I1 + I2
+    coupling = m2 * (bx * cx + by * cy) + I2
+    elbow = m2 * (cx * cx + cy * cy) + I2
+    # rotors by the turns of each joint, (gear, 0) and (1, -gear): the elbow's rotor turns against its joint
+    return shoulder + rotor * (gear**2 + 1.0), coupling - rotor * gear, elbow + rotor * gear**2
 
 
 @njit(cache=True)
-def _height(q, p):
+def _height(q1, q2, p):
     m1, m2, l1, r1, r2 = p[:5]
-    return -9.81 * (m1 * r1 * np.cos(q[0]) + m2 * (l1 * np.cos(q[0]) + r2 * np.cos(q[0] + q[1])))
+    return -9.81 * (m1 * r1 * np.cos(q1) + m2 * (l1 * np.cos(q1) + r2 * np.cos(q1 + q2)))
+
+
+@njit(cache=True)
+def _slopes(q1, q2, d1, d2, p):
+    """Of the mass matrix' three numbers and of the height, along the step (d1, d2) = 1e-5 of one joint."""
+    a, b, c = _mass(q1 + d1, q2 + d2, p)
+    a_0, b_0, c_0 = _mass(q1 - d1, q2 - d2, p)
+    up, down = _height(q1 + d1, q2 + d2, p), _height(q1 - d1, q2 - d2, p)
+    e = 2.0 * (d1 + d2)
+    return (a - a_0) / e, (b - b_0) / e, (c - c_0) / e, (up - down) / e
 
 
 @njit(cache=True)
 def _run(reference, fine, dt, p, dry, viscous, on_sum, noise, out):
-    q, v, e = reference[0].copy(), np.zeros(2), 1e-5
-    slope = np.zeros((2, 2, 2))
+    q1, q2, v1, v2 = reference[0, 0], reference[0, 1], 0.0, 0.0
     for k in range(len(reference) - 1):
-        ahead = (reference[k + 1] - reference[k]) / (dt * fine)
-        asked = np.array([60.0, 25.0]) * (reference[k] - q) + np.array([4.0, 1.0]) * (ahead - v) + noise[k]
-        out[k, :2], out[k, 2:] = q, asked
+        ahead1, ahead2 = (reference[k + 1] - reference[k]) / (dt * fine)
+        asked1 = 60.0 * (reference[k, 0] - q1) + 4.0 * (ahead1 - v1) + noise[k, 0]
+        asked2 = 25.0 * (reference[k, 1] - q2) + 1.0 * (ahead2 - v2) + noise[k, 1]
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = q1, q2, asked1, asked2
         for _ in range(fine):
-            M, gravity = _mass(q, p), np.zeros(2)
-            for j in range(2):
-                step = np.zeros(2)
-                step[j] = e
-                slope[j] = (_mass(q + step, p) - _mass(q - step, p)) / (2.0 * e)
-                gravity[j] = (_height(q + step, p) - _height(q - step, p)) / (2.0 * e)
-            rates = slope[0] * v[0] + slope[1] * v[1]
-            pull = np.array([0.5 * v @ slope[0] @ v, 0.5 * v @ slope[1] @ v])
-            friction = dry * np.tanh(v / 2e-3) + viscous * v + on_sum * np.tanh((v[0] + v[1]) / 2e-3)
-            v = v + dt * np.linalg.solve(M, asked - friction - rates @ v + pull - gravity)
-            q = q + dt * v
+            M11, M12, M22 = _mass(q1, q2, p)
+            a1, b1, c1, gravity1 = _slopes(q1, q2, 1e-5, 0.0, p)
+            a2, b2, c2, gravity2 = _slopes(q1, q2, 0.0, 1e-5, p)
+            a, b, c = a1 * v1 + a2 * v2, b1 * v1 + b2 * v2, c1 * v1 + c2 * v2  # dM/dt
+            pull1 = 0.5 * (a1 * v1 * v1 + 2.0 * b1 * v1 * v2 + c1 * v2 * v2)
+            pull2 = 0.5 * (a2 * v1 * v1 + 2.0 * b2 * v1 * v2 + c2 * v2 * v2)
+            of_both = on_sum * np.tanh((v1 + v2) / 2e-3)
+            f1 = asked1 - dry[0] * np.tanh(v1 / 2e-3) - viscous[0] * v1 - of_both - a * v1 - b * v2 + pull1 - gravity1
+            f2 = asked2 - dry[1] * np.tanh(v2 / 2e-3) - viscous[1] * v2 - of_both - b * v1 - c * v2 + pull2 - gravity2
+            det = M11 * M22 - M12 * M12
+            v1, v2 = v1 + dt * (M22 * f1 - M12 * f2) / det, v2 + dt * (M11 * f2 - M12 * f1) / det
+            q1, q2 = q1 + dt * v1, q2 + dt * v2
 
 
 def records(arm: Arm, seed: int, *, seconds: float = 8.0, hz: int = 500) -> tuple[Record, Record]:
