@@ -20,11 +20,11 @@ from benchmarks import strata_laws
 from ema.core.records import Array, Cycle, Record
 
 EFFECTS = list(hidden_axis.LIBRARY)
-OUTSIDE = [*hidden_axis.OUTSIDE, *(kind for kind in strange.KINDS if kind != "nothing")]
+OUTSIDE = [*hidden_axis.OUTSIDE, *(kind for kind in strange.KINDS if kind not in ("nothing", "current_lag"))]
 # Effects of the library that act like what is outside it, so that naming them is the right place.
 NEAR = {
     "cushion": ("spring_load",), "gap": ("gear_compliance",), "maxwell_slip": ("friction_memory",),
-    "heat": ("friction_drift",), "clutch": ("gear_compliance",), "current_lag": ("speed_delay", "position_delay"),
+    "heat": ("friction_drift",), "clutch": ("gear_compliance",),
     "one_way_fan": ("quadratic_drag", "viscous_by_direction"), "load_step": ("constant_load",),
     # an axis that is driven by less torque per current is as one that is heavier and has more friction
     "one_sided_driver": ("drive_unequal", "drive_gain", "magnet_flux", "inertia"),
@@ -42,7 +42,7 @@ EXACT = {"cogging.amplitude", "asymmetric_friction.asymmetry", "constant_load.to
          "clock_skew.rate", "inertia.change", "drive_gain.gain", "drive_offset.offset",
          "viscous_by_direction.difference", "output_load_friction.share", "pendulum.amplitude",
          "quadratic_load_friction.per_square", "quadratic_output_load_friction.per_torque", "friction_drift.rate",
-         "viscous_drift.rate", "gear_error.amplitude", "external_torque.amplitude"}  # fmt: skip
+         "viscous_drift.rate", "gear_error.amplitude", "external_torque.amplitude", "drive_lag.time"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -273,7 +273,7 @@ def _loop(kind: str, plant_file: dict[str, Any], record: Record, values: dict[st
 
 # Shares of all trials, and what makes one.
 STRATA: dict[str, tuple[float, Callable[[int, int, str], Trial]]] = {
-    "nothing": (0.14, _nothing), "one effect": (0.22, _one), "law, cascaded loops": (0.2, _law),
+    "nothing": (0.13, _nothing), "one effect": (0.22, _one), "law, cascaded loops": (0.21, _law),
     "two effects": (0.1, _two), "three effects": (0.05, _three), "outside the library": (0.08, _outside),
     "recorder": (0.07, _spoiled), "other makers": (0.07, _other), "loops": (0.07, _loops),
 }  # fmt: skip

@@ -201,6 +201,11 @@ def _hardening(a: geared.Axis, rng: Rng) -> Hidden:
     return Hidden(replace(a, spring=(stiffness, cube)), effects=("stiffening_spring",))
 
 
+def _slow_current(a: geared.Axis, rng: Rng) -> Hidden:
+    lag = rng.uniform(2e-3, 6e-3)
+    return Hidden(replace(a, lag=lag), {"drive_lag.time": lag})
+
+
 FILTERED = "speed_delay"
 HIDDEN: dict[str, Callable[[geared.Axis, Rng], Hidden]] = {
     "friction_memory": _memory,
@@ -222,4 +227,5 @@ HIDDEN: dict[str, Callable[[geared.Axis, Rng], Hidden]] = {
     "viscous_slope": _slope("viscous_slope", "viscous_slope"),
     "drive_unequal": _unequal,
     "hardening_spring": _hardening,
+    "drive_lag": _slow_current,
 }

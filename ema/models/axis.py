@@ -15,6 +15,7 @@ from ema.effects.torque_term import COLUMNS, NEUTRAL
 from . import axis_kernel as kernel
 from .axis_config import INSTANCE, LINES, Axis
 from .axis_layout import N_ROWS, row
+from .lag import follow
 
 Array = NDArray[np.float64]
 MODES = {
@@ -122,6 +123,16 @@ def simulate(
     model = (numbers.z, numbers.lines, numbers.terms, MODES[drive], BETWEEN[between])
     kernel.simulate_windows(*model, offsets, t, recorded, starts, slide, dT, h_max, out)
     return out
+
+
+def lag_of_drive(numbers: Model) -> float:
+    """Time constant with which what acts follows the recorded drive, by the clock of the record. [s]"""
+    return float(numbers.z[row("drive_lag.time")] / (1.0 + numbers.z[row("clock_skew.rate")]))
+
+
+def acting_drive(lag: float, t: Array, recorded: Array, between: str = "straight") -> Array:
+    """What acts of a recorded drive that is followed with a time constant; arguments as in `simulate`."""
+    return follow(t, recorded, lag, BETWEEN[between]) if lag > 0.0 else recorded
 
 
 def holding(numbers: Model, theta: Array, direction: Array, t: Array) -> Array:

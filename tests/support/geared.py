@@ -43,6 +43,7 @@ class Axis:
     unequal: float = 0.0  # share by which the drive gives more one way, and less the other
     saturation: float = 0.0  # [1/A^2] loss of the torque constant by the current's square
     lines: tuple[tuple[float, float, float], ...] = ()  # amplitude [N m], order per motor turn, phase
+    lag: float = 0.0  # [s] time constant with which the current follows the one that is asked for and recorded
     reads: float = 1.0  # recorded current over the true one
     warms: tuple[float, float, float] = (20.0, 20.0, 4.0)  # [°C] from, to, [s] with this time constant
     hz: int = 1000
@@ -51,11 +52,11 @@ class Axis:
 
 @njit(cache=True)
 def _run(reference, hz, p, of_load, along, warm, lines, loop, out):
-    J, F, C, k_t, bristle, dry_k, activation, dry_rate, viscous_rate, by_square, flux, unequal, saturation = p
+    J, F, C, k_t, bristle, dry_k, activation, dry_rate, viscous_rate, by_square, flux, unequal, saturation, lag = p
     gravity, by_load, by_load_square = of_load
     dry_slope, viscous_slope, stiffness, hardens = along
     K_p, K_w = loop
-    theta, w, z = reference[0], 0.0, 0.0
+    theta, w, z, acts = reference[0], 0.0, 0.0, 0.0
     dt = 1.0 / (hz * FINE)
     for k in range(len(reference)):
         ahead = (reference[min(k + 1, len(reference) - 1)] - reference[max(k - 1, 0)]) * hz / 2
@@ -66,7 +67,8 @@ def _run(reference, hz, p, of_load, along, warm, lines, loop, out):
         drag = C * (1.0 + viscous_rate * t) * np.exp(activation * (1.0 / kelvin - 1.0 / 293.15))
         dry = F * (1.0 + dry_rate * t) * np.exp(-dry_k * (warm[k] - 20.0))
         for _ in range(FINE):
-            motor = k_t * (1.0 + flux * (warm[k] - 20.0) + unequal * np.sign(i)) * i / (1.0 + saturation * i * i)
+            acts = acts + dt / lag * (i - acts) if lag > 0.0 else i
+            motor = k_t * (1.0 + flux * (warm[k] - 20.0) + unequal * np.sign(i)) * acts / (1.0 + saturation * i * i)
             load = gravity * np.sin(theta)
             other = drag * (1.0 + viscous_slope * theta) * w + load + stiffness * theta + hardens * theta**3
             for n in range(lines.shape[0]):
@@ -103,7 +105,7 @@ def record(
     p = (
         *(axis.J, axis.F, axis.C, axis.k_t, axis.bristle, axis.dry_per_kelvin, axis.viscous_activation),
         *(axis.dry_rate, axis.viscous_rate, axis.by_square, axis.flux_per_kelvin, axis.unequal),
-        axis.saturation,
+        *(axis.saturation, axis.lag),
     )
     of_load = (axis.gravity, axis.by_load, axis.by_load_square)
     along = (axis.dry_slope, axis.viscous_slope, *axis.spring)

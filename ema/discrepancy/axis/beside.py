@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .plant import AxisPlant
     from .windows import Bench
 
-OF_SENSORS = ("position_delay", "speed_delay", "clock_skew", "resolver_error", "encoder_error")
+OF_SENSORS = ("position_delay", "speed_delay", "clock_skew", "resolver_error", "encoder_error", "drive_lag")
 
 
 def balance_beside(plant: AxisPlant, point: Point) -> Balance | None:
@@ -69,6 +69,8 @@ class _Extended:
         for name, effect in ((b.roles.position, "position_delay"), (b.roles.speed, "speed_delay")):
             if name and self._late.get(effect):
                 channels[name] = np.interp(t + self._late[effect], t, c[name])
+        lag = axis.lag_of_drive(self._sensors)
+        channels[b.roles.drive] = axis.acting_drive(lag, t, c[b.roles.drive], self.between)
         if b.roles.position:
             channels |= self._straight(b, channels)
         channels["t"] = t[0] + (t - t[0]) * (1.0 + self._clock)

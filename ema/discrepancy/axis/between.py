@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ema.discrepancy.examine import examine
+from ema.discrepancy.fitting import fit
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Point
 from ema.discrepancy.progress import Progress
@@ -22,9 +23,11 @@ from ema.discrepancy.selection import ODDS, Tried, above_noise, compare, fit_bas
 from ema.discrepancy.verdict import judge
 
 from .plant import AxisPlant
+from .screened import begin_at
 
 LATE = {"straight": 0.0, "held": 0.5, "held before": -0.5}  # samples by which the motion is later than straight
 DELAYS = {"position_delay.time": {"theta_m", "q"}, "speed_delay.time": {"w_m", "v"}}  # and the channels they are of
+LAG = "drive_lag.time"
 MUCH = 0.5  # share of what is left above noise, from which another way is taken
 NEARLY_HALF = 0.25  # samples by which half a sample may be missed
 ALIKE, LITTLE = 1.05, 2e-3  # times what is left, or share in power of what there was: fewer effects are preferred
@@ -67,6 +70,7 @@ def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
             return outcome
     if plant.between in SAID:
         outcome.notes.append(SAID[plant.between])
+    _widen_lag(plant, outcome)
     return outcome
 
 
@@ -157,8 +161,7 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     if plant.plant.drive == "speed-loop":
         return plant.between
     blocks = range(len(plant.blocks))
-    period = float(np.median([w.period for w in plant.windows if not w.static]))
-    here = plant.between
+    here, period = plant.between, _period(plant)
 
     def taken(way: str) -> Tried:
         plant.between = way
@@ -176,9 +179,34 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     return "held" if here == "straight" and by_half else here
 
 
+def _period(plant: AxisPlant) -> float:
+    return float(np.median([w.period for w in plant.windows if not w.static]))
+
+
+def _widen_lag(plant: AxisPlant, outcome: Outcome) -> None:
+    """Let the interval of a drive's lag hold what it is with each way that the records do not rule out."""
+    lags = [e["parameters"]["time"] for e in outcome.effects if e["name"] == "drive_lag"]
+    if not lags:
+        return
+    blocks, here, fits = list(range(len(plant.blocks))), plant.between, {}
+    free = [*plant.base, *begin_at("drive_lag", {"time": outcome.point[LAG]}, {}).free]
+    for way in LATE:
+        plant.between = way
+        point = _shorten_delays(outcome.point, (LATE[way] - LATE[here]) * _period(plant))
+        fits[way] = fit(plant, free, point, blocks)
+    plant.between = here
+    tried = {way: Tried((), (), (), tuple(f.residuals)) for way, f in fits.items()}
+    for way, f in fits.items():
+        if not compare(tried[here], tried[way]).is_clear:
+            for lag in lags:
+                later = f.point[LAG] - fits[here].point[LAG]
+                lag["low"] = max(lag["low"] + min(later, 0.0), 0.0)
+                lag["high"] += max(later, 0.0)
+
+
 def _shorten_delays(point: Point, by: float) -> Point:
     """The point with what delays it has shorter, as far as they go."""
-    return {**point, **{name: max(point[name] - by, 0.0) for name in DELAYS if name in point}}
+    return {**point, **{name: max(point[name] - by, 0.0) for name in (*DELAYS, LAG) if name in point}}
 
 
 def _is_simpler(other: Outcome, one: Outcome) -> bool:

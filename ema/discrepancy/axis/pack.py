@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema.core.records import Array
+from ema.models import axis
+from ema.models.axis_layout import row
 
 from .whitening import Filter, join
 from .windows import Bench, Window
@@ -54,6 +56,7 @@ class Pack:
         self.filter = join(filters) if filters else None
         self._led_in = {0: LedIn(0, self.offsets, self.t, self.drive, slice(None))}  # and the last other one asked for
         self._histories: dict[tuple[float, int], History] = {}  # the last one asked for
+        self._acting: dict[tuple[float, str], dict[int, Array]] = {}  # the same
 
     def led_in(self, late: float) -> LedIn:
         """The windows, each with the motion before it that a sensor shows in it which is `late`. [s]"""
@@ -62,11 +65,21 @@ class Pack:
             self._led_in = {0: self._led_in[0], n: LedIn.of(self.windows, n)}
         return self._led_in[n]
 
-    def drive_by(self, clock: float, led_in: LedIn) -> Array:
-        """The drive there, where it has a clock of its own."""
-        if clock == 0.0:
-            return led_in.drive
-        return np.concatenate([w.drive_by(clock, led_in.n) for w in self.windows])
+    def drive_by(self, model: axis.Model, led_in: LedIn, between: str) -> Array:
+        """The drive there, where it has a clock of its own, or is followed with a lag."""
+        clock, lag = model.z[row("clock_skew.currents")], axis.lag_of_drive(model)
+        if lag == 0.0:
+            return led_in.drive if clock == 0.0 else np.concatenate([w.drive_by(clock, led_in.n) for w in self.windows])
+        acting = self._after_lag(lag, between)
+        return np.concatenate([w.drive_by(clock, led_in.n, acting[w.part.number]) for w in self.windows])
+
+    def _after_lag(self, lag: float, between: str) -> dict[int, Array]:
+        """What acts of the drive, by part."""
+        if (lag, between) not in self._acting:
+            parts = {w.part.number: w.part for w in self.windows}.values()
+            found = {part.number: axis.acting_drive(lag, part.t, part.drive, between) for part in parts}
+            self._acting = {(lag, between): found}
+        return self._acting[lag, between]
 
     def history(self, late: float = 0.0, n: int = 0) -> History:
         """Motion up to `n` samples before each window, since that of the one before, of a position recorded `late`. [s]

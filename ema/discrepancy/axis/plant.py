@@ -206,7 +206,7 @@ class AxisPlant:
         starts = self._starts(pack, model, step, led_in.n)
         starts[:, 0] += zero
         drive = pack.bench.roles.kind
-        record = (led_in.offsets, led_in.t, pack.drive_by(model.z[row("clock_skew.currents")], led_in), starts)
+        record = (led_in.offsets, led_in.t, pack.drive_by(model, led_in, self.between), starts)
         bristles = self._bristles(pack, model, led_in.n)
         out = axis.simulate(model, drive, *record, step, pack.dT, pack.slide, self.between, bristles)[:, led_in.own]
         out[0] -= zero

@@ -172,7 +172,8 @@ def _moving(plant: Measured, model: axis.Model, j: int, offset: int, zero: float
     raw_w = w.speed if speed_row is None else w.outputs[speed_row]
     speed = np.interp(w.t + late[1], w.t, w.speed)
     raw_w = np.interp(w.t + late[1], w.t, raw_w)
-    drive = (w.drive_by(z[row("clock_skew.currents")]) - z[row("drive_offset.offset")]) / (
+    acting = axis.acting_drive(axis.lag_of_drive(model), w.part.t, w.part.drive, plant.between)
+    drive = (w.drive_by(z[row("clock_skew.currents")], acting=acting) - z[row("drive_offset.offset")]) / (
         1.0 + z[row("drive_gain.gain")]
     )
     i, k_t = _current(b, w, drive, speed, z)

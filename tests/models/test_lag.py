@@ -1,0 +1,57 @@
+"""A drive that is followed with a lag, against a simulation in steps a thousand times as fine as its samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema.models import axis
+from ema.models.axis_config import RotaryAxis
+
+LAG = 3e-3
+
+
+def finely(t, u, between, n=1000):
+    """Values at the stamps of a straight drive; of a held one means over the samples that a value stands for."""
+    x, out = u[0], np.empty_like(u)
+    out[0] = x
+    for k in range(len(u) - 1):
+        h, mean = (t[k + 1] - t[k]) / n, 0.0
+        for m in range(n):
+            given = {"straight": u[k] + (m + 0.5) / n * (u[k + 1] - u[k]), "held": u[k], "held before": u[k + 1]}
+            middle = x + 0.5 * h / LAG * (given[between] - x)
+            x += h / LAG * (given[between] - middle)
+            mean += middle / n
+        if between == "held":
+            out[k] = mean
+            out[k + 1] = x
+        else:
+            out[k + 1] = x if between == "straight" else mean
+    return out
+
+
+@pytest.mark.parametrize("between", ["straight", "held", "held before"])
+def test_what_acts_is_the_drive_through_a_filter_of_the_first_order(between):
+    rng = np.random.default_rng(1)
+    t = np.cumsum(rng.uniform(0.5e-3, 2e-3, 50))
+    u = rng.standard_normal(50)
+    np.testing.assert_allclose(axis.acting_drive(LAG, t, u, between), finely(t, u, between), atol=1e-6)
+
+
+def test_without_a_lag_it_is_the_drive():
+    u = np.arange(3.0)
+    assert axis.acting_drive(0.0, u, u) is u
+
+
+def test_a_lag_of_the_plant_file_counts():
+    plant = RotaryAxis.model_validate(
+        {
+            "kind": "axis",
+            "drive": "current",
+            "J": 1e-4,
+            "F_d": 0.01,
+            "k_t": 0.05,
+            "effects": {"drive_lag": {"time": LAG}},
+        }
+    )
+    assert axis.lag_of_drive(axis.model(plant)) == LAG
