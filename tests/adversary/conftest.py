@@ -73,4 +73,6 @@ def pytest_terminal_summary(terminalreporter, config):
     page = config.getoption("--reliability", default=None)
     if page and rows:
         path = Path(page)
-        path.write_text(replaced(path.read_text(), rows, attacks(HERE)))
+        whole = path.with_name(f"{path.name}.new")  # the tests beside this one read the page
+        whole.write_text(replaced(path.read_text(), rows, attacks(HERE)))
+        whole.replace(path)

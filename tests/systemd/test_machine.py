@@ -53,7 +53,9 @@ def machine(request, coarse_bundle, tmp_path_factory):
     (job / "at-shutdown").chmod(0o755)
     pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
     source = job / "source"  # setuptools builds inside the source tree
-    shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns(".*", "build", "dist", "*.egg-info", "out", "var"))
+    shutil.copytree(
+        ROOT, source, ignore=shutil.ignore_patterns(".*", "__pycache__", "build", "dist", "*.egg-info", "out", "var")
+    )
     subprocess.run([*pip, "--wheel-dir", job, source], check=True)
     shutil.rmtree(source)
     (wheel,) = job.glob("*.whl")

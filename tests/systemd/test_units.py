@@ -65,7 +65,9 @@ def test_install_and_uninstall_below_destdir(tmp_path):
     stage, wheels = tmp_path / "stage", tmp_path / "wheels"
     pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
     copy = tmp_path / "source"  # setuptools builds inside the source tree
-    shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".*", "build", "dist", "*.egg-info", "out", "var"))
+    shutil.copytree(
+        ROOT, copy, ignore=shutil.ignore_patterns(".*", "__pycache__", "build", "dist", "*.egg-info", "out", "var")
+    )
     subprocess.run([*pip, "--wheel-dir", wheels, copy], check=True)
     (wheel,) = wheels.iterdir()
     environment = {**os.environ, "DESTDIR": str(stage), "PYTHON": sys.executable}
