@@ -13,6 +13,7 @@ from ema.core.records import Array
 FALSE_ALARMS = 0.005  # of all tests together
 GROUPS = (1, 8, 64)  # samples averaged before a chi-square: the time scales looked at
 N_LAGS = 8
+BOUND = 1.0  # relative uncertainty of an amplitude that is known to its order of magnitude
 CLIP = 5.0  # a single wild sample is not a cause
 
 
@@ -66,12 +67,17 @@ def correlation_test(residuals: Sequence[Array], n_lags: int = N_LAGS) -> float:
 
 
 def judge(residuals: Sequence[Array], *, noise_uncertainty: float = 0.0, n_free: int = 0) -> Verdict:
-    """Verdict on residuals."""
+    """Verdict on residuals.
+
+    Noise of which nothing but a bound is known (`BOUND`) may have any shape: then only its size is tested.
+    """
+    groups = GROUPS if noise_uncertainty < BOUND else GROUPS[:1]
     p = {
         f"residual larger than noise at {g} samples": scale_test(residuals, g, noise_uncertainty, n_free)
-        for g in GROUPS
+        for g in groups
     }
-    p["neighbouring residuals are correlated"] = correlation_test(residuals)
+    if noise_uncertainty < BOUND:
+        p["neighbouring residuals are correlated"] = correlation_test(residuals)
     corrected = {name: min(1.0, value * len(p)) for name, value in p.items()}
     because = min(corrected, key=lambda name: corrected[name])
     flat = np.concatenate([np.clip(block, -CLIP, CLIP).ravel() for block in residuals])

@@ -30,11 +30,14 @@ class Noise:
     jitter : float
         rms of the sampling time. [s]
     declared : bool
+    is_bound : bool
+        The channel shows less than what no simulation is expected to be better than.
     """
 
     sigma: float
     jitter: float = 0.0
     declared: bool = False
+    is_bound: bool = False
 
     def rms(self, slope: Array) -> Array:
         """Rms at a given slope of the channel, shape of `slope`."""
@@ -92,7 +95,7 @@ def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None, lea
     floor = max(of_steps, least, 1e-9 * float(np.std(everything)), 1e-12)
     parts = [disagreement(cycle["t"], cycle[name]) for cycle in cycles if cycle.n_samples > 8]
     if not parts:
-        return Noise(floor)
+        return _at_least(least, floor)
     r = np.concatenate([p[0] for p in parts])
     slope = np.abs(np.concatenate([p[1] for p in parts]))
     edges = np.quantile(slope, np.linspace(0.0, 1.0, N_BINS + 1))
@@ -104,10 +107,14 @@ def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None, lea
             square.append(float(np.mean(slope[inside] ** 2)))
             weight.append(1.0 / max(variance[-1], floor**2))
     if not variance:
-        return Noise(max(floor, float(np.sqrt(_robust_variance(r, of_steps)))))
+        return _at_least(least, max(floor, float(np.sqrt(_robust_variance(r, of_steps)))))
     v, s, w = np.array(variance), np.array(square), np.array(weight)
     (a, b), _ = nnls(np.stack([w, w * s], axis=1), w * v)
-    return Noise(max(float(np.sqrt(a)), floor), float(np.sqrt(b)))
+    return _at_least(least, max(float(np.sqrt(a)), floor), float(np.sqrt(b)))
+
+
+def _at_least(least: float, sigma: float, jitter: float = 0.0) -> Noise:
+    return Noise(sigma, jitter, is_bound=sigma == least)
 
 
 def is_derived(cycle: Cycle, position: str, speed: str) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ema.core.records import Array, Record
 from ema.discrepancy.plant import Block, Candidate, Errors, Fitted, Free, Point
+from ema.discrepancy.verdict import BOUND
 from ema.models import axis
 from ema.models.axis_config import INSTANCE, LINES, Axis
 from ema.models.axis_layout import row
@@ -101,9 +102,11 @@ class AxisPlant:
 
     @property
     def noise_uncertainty(self) -> float:
-        """Zero where the plant file declares the noise of every channel that is compared."""
-        declared = all(noise.declared for b in self.benches for noise in b.noise.values())
-        return 0.0 if declared else ESTIMATE_UNCERTAINTY
+        """Zero where the plant file declares the noise of every channel that is compared; large where none has any."""
+        if all(noise.declared for b in self.benches for noise in b.noise.values()):
+            return 0.0
+        compared = [b.noise[name] for b in self.benches for name in b.roles.outputs]
+        return BOUND if all(noise.is_bound for noise in compared) else ESTIMATE_UNCERTAINTY
 
     def residuals(self, points: Sequence[Point], blocks: Sequence[int]) -> list[list[Array]]:
         """Whitened residuals, clipped where a window runs away."""

@@ -1,0 +1,42 @@
+"""A record without any noise: what a simulation is exact to is a bound, of whatever shape, and no white noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ema.core.records import Cycle
+from ema.discrepancy.axis.between import examine_ways
+from ema.discrepancy.axis.noise import estimate
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.verdict import BOUND, judge
+from ema.models.axis_config import RotaryAxis
+
+
+def test_of_a_channel_without_noise_only_a_bound_is_known():
+    t = np.arange(2000) * 1e-3
+    clean = Cycle(0, {"t": t, "w_m": 10.0 * np.sin(2.0 * np.pi * t)})
+    noisy = Cycle(0, {"t": t, "w_m": clean["w_m"] + 0.05 * np.random.default_rng(0).standard_normal(len(t))})
+    assert estimate((clean,), "w_m", None, least=2e-3).is_bound
+    assert not estimate((noisy,), "w_m", None, least=2e-3).is_bound
+
+
+def test_what_moves_slowly_within_a_bound_is_no_cause_and_beyond_it_is():
+    slow = [np.sin(np.linspace(0.0, 20.0, 400))[None, :] for _ in range(4)]
+    assert not judge(slow, noise_uncertainty=0.1).is_noise
+    assert judge(slow, noise_uncertainty=BOUND).is_noise
+    assert not judge([4.0 * x for x in slow], noise_uncertainty=BOUND).is_noise
+
+
+@pytest.mark.slow
+def test_drag_beside_bristles_is_named_without_a_gear_that_gives(support):
+    other = support("axis_other")
+    setup = other.SETUPS["clean"]
+    hidden = [0.0] * 8
+    hidden[other.VISCOUS] = 1.2 * setup.F_d / max(m[0] for m in setup.motions)
+    record = other.record(replace(setup, hidden=tuple(hidden)), 1)
+    (drag,) = examine_ways(AxisPlant(RotaryAxis.model_validate(other.plant(setup)), [record])).effects
+    assert drag["name"] == "viscous_drag"
+    assert drag["confidence"] > 0.9
