@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import can
+from typing import TYPE_CHECKING, Any
 
 from .frames import MAX_DATA, FrameFlag
+
+if TYPE_CHECKING:
+    import can
 
 _NS = 1_000_000_000
 
 
 def message(frame: Any, channel: Any = None) -> can.Message:
     """python-can message of one frame (a scalar of FRAME_DTYPE)."""
+    import can  # with what it reads other tools' logs by: half a second that a command on our own logs has no need of
+
     flags = int(frame["flags"])
     seconds, ns = divmod(int(frame["t_ns"]), _NS)
     return can.Message(

@@ -1,5 +1,8 @@
 """Exports of raw frames: what was written is read back the same, or refused in words; never fewer in silence."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -97,3 +100,9 @@ def test_a_format_without_can_fd_is_refused_in_words_and_leaves_no_file(flight, 
     assert f"f{suffix}: cannot hold {what}" in str(answer.exception)
     assert "choose .blf" in str(answer.exception)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_log_of_our_own_is_opened_without_what_reads_those_of_other_tools():
+    """Half a second of each command."""
+    code = "import sys, ema_postflight.open_log; assert not {'can', 'asammdf', 'pandas'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
