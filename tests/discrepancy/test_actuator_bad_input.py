@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,31 @@ def test_desynchronised(good, shipped_plant):
     late = {name: np.roll(good[name], 200) for name in ("i_a", "i_b", "i_c")}
     with pytest.raises(RecordError, match="not synchronised"):
         prepare(shipped_plant, [record(changed(good, **late))])
+
+
+@pytest.mark.parametrize("seconds", [0.008, 0.02, -0.008, -0.02])
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [(["theta_u"], "θ_u come {} s {} θ_m"), (["i_a", "i_b", "i_c"], "the currents come {} s {} θ_m")],
+    ids=["user", "currents"],
+)
+def test_what_is_late_and_by_how_much_is_told(good, shipped_plant, names, said, seconds):
+    """Of a chirp whose user was 20 ms late the currents had been said to come 0.0495 s before."""
+    at = (np.arange(len(good["t"])) - round(seconds / 1e-4)).clip(0, len(good["t"]) - 1)
+    shifted = {name: good[name][at] for name in names}
+    with pytest.raises(RecordError, match="not synchronised") as error:
+        prepare(shipped_plant, [record(changed(good, **shifted))])
+    told = re.search(said.format(r"([0-9.]+)", r"(after|before)"), str(error.value))
+    assert told is not None
+    assert float(told[1]) == pytest.approx(abs(seconds), abs=1e-3)
+    assert told[2] == ("after" if seconds > 0.0 else "before")
+
+
+@pytest.mark.parametrize("motion", ["chirp", "slow"])
+def test_a_spring_that_takes_most_of_the_torque_is_no_lack_of_synchrony(hidden, shipped_plant, motion):
+    motions = (hidden.chirp() if motion == "chirp" else hidden.sine(0.02, 2.0, 1.0),)
+    (cycle,) = hidden.cycles(hidden.Flaws(spring=3000.0), 1, 3, motions)
+    assert prepare(shipped_plant, [record(cycle)]).n_cycles == 1
 
 
 @pytest.mark.parametrize("factor", [0.5, 0.8, 1.25, 3.0])

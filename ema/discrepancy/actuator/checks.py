@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 from scipy.optimize import nnls
 
@@ -15,6 +19,8 @@ from .features import Signals, motor_torque, reference, reference_terms
 MAX_LAG = 6e-3  # [s] no sensor or loop of this plant is that late; channels are apart
 MAX_CLIPPED = 0.1  # share of samples at the largest value
 APART = 2.0  # times what channels leave of each other where they agree best, that they leave at a credible lag
+REACH, STRIDE = 0.05, 5  # [s] how far a lag is looked for; [samples] in what steps
+SMOOTH, SLOW = 20, 2.0  # samples to either side of a mean; [rad/s] where dry friction changes its side
 FOLLOWING = 0.5  # correlation of channels that belong together, at least
 
 
@@ -68,14 +74,28 @@ def _check_clipping(where: str, s: Signals, plant: Actuator) -> None:
 def _check_synchrony(where: str, s: Signals, plant: Actuator) -> None:
     """Channels that belong together must not be apart by more than any sensor or loop can be late."""
     rate = plant.control.rate
-    reach = int(0.05 * rate)
+    reach, credible = int(REACH * rate), MAX_LAG * rate
     slow = ", or the current control is far slower than the plant file's"
+    # What the controller asks for is made of all channels: it tells of the command once the others are known to agree.
+    resisted = _resisted(plant, s)
     pairs = (
-        ("the currents", "position and command", _lag_of_loop(plant, s, reach), slow),
-        ("θ_u", "θ_m", _lag(s.theta_u[0], s.theta_m[0], reach, MAX_LAG * rate), ""),
+        ("θ_u", "θ_m", lambda: _lag(partial(_shifted, s.theta_u[0], s.theta_m[0]), reach, credible), ""),
+        (
+            "the currents",
+            "θ_m",
+            lambda: _lag(partial(_torque_shifted, plant, s, resisted), reach, credible),
+            "",
+        ),
+        ("the currents", "position and command", lambda: _lag_of_loop(plant, s, reach), slow),
     )
-    for late, early, (lag, correlation), or_else in pairs:
-        if abs(lag) > MAX_LAG * rate:
+    for late, early, find, or_else in pairs:
+        lag, correlation = find()
+        if abs(lag) > credible:
+            if abs(lag) > reach - STRIDE:  # they agree best beyond
+                raise RecordError(
+                    f"{where}: {late} follow {early} at no lag up to {REACH:g} s: "
+                    f"channels are not synchronised{or_else}"
+                )
             side = "after" if lag > 0 else "before"
             raise RecordError(
                 f"{where}: {late} come {abs(lag) / rate:.3g} s {side} {early}: channels are not synchronised{or_else}"
@@ -87,6 +107,18 @@ def _check_synchrony(where: str, s: Signals, plant: Actuator) -> None:
             )
 
 
+def _resisted(plant: Actuator, s: Signals) -> Array:
+    """What a motor's torque is for, whatever controls it: acceleration, drag, friction, a spring at the load, (n, 4).
+
+    Each is of unit scale, since the plant file may have others.
+    """
+    theta = s.theta_m[0]
+    along = np.pad(theta, SMOOTH, mode="reflect", reflect_type="odd")
+    w = np.gradient(np.convolve(along, np.full(2 * SMOOTH + 1, 1.0 / (2 * SMOOTH + 1)), "valid"))
+    terms = np.stack([np.gradient(w), w, np.tanh(w * plant.control.rate / SLOW), theta], axis=1)
+    return np.asarray(terms / terms.std(axis=0))
+
+
 def _lag_of_loop(plant: Actuator, s: Signals, reach: int) -> tuple[int, float]:
     """Samples by which the torque is later than what the controller should ask for, and their correlation there.
 
@@ -94,23 +126,24 @@ def _lag_of_loop(plant: Actuator, s: Signals, reach: int) -> tuple[int, float]:
     the sum of its two terms with whatever positive gains fit best.
     """
     tau, credible = motor_torque(plant, s)[0][0], MAX_LAG * plant.control.rate
-    lag, correlation = _lag(tau, reference(plant, s)[0], reach, credible)
+    lag, correlation = _lag(partial(_shifted, tau, reference(plant, s)[0]), reach, credible)
     if abs(lag) <= credible and correlation >= FOLLOWING:
         return lag, correlation
     terms = reference_terms(plant, s)[:, 0]
-    other = _lag(tau, (terms / terms.std(axis=1, keepdims=True)).T, reach, credible)
+    other = _lag(partial(_shifted, tau, (terms / terms.std(axis=1, keepdims=True)).T), reach, credible)
     return max((lag, correlation), other, key=lambda found: found[1])
 
 
-def _lag(x: Array, y: Array, reach: int, credible: float) -> tuple[int, float]:
-    """Samples by which `x` is later than `y` where they agree best, and their correlation there.
+def _lag(shifted: Callable[[int], tuple[Array, Array]], reach: int, credible: float) -> tuple[int, float]:
+    """Samples by which x is later than y where they agree best, and their correlation there.
 
-    A credible lag is taken where they agree hardly worse: slow motion says little about lags. Of several `y`, shape
-    (n_times, n), the sum with positive weights that fits best is taken.
+    `shifted` gives what of x is so many samples later, and the y beside it. A credible lag is taken where they agree
+    hardly worse: slow motion says little about lags. Of several y, shape (n_times, n), the sum with positive weights
+    that fits best is taken.
     """
     best, near = (0, -1.0), (0, -1.0)
-    for lag in range(-reach, reach + 1, 5):
-        a, b = _shifted(x, y, lag)
+    for lag in range(-reach, reach + 1, STRIDE):
+        a, b = shifted(lag)
         r = _correlation(a - a.mean(), b - b.mean(axis=0))
         best = (lag, r) if r > best[1] + 1e-6 else best
         near = (lag, r) if r > near[1] + 1e-6 and abs(lag) <= credible else near
@@ -127,3 +160,10 @@ def _correlation(x: Array, y: Array) -> float:
 def _shifted(x: Array, y: Array, lag: int) -> tuple[Array, Array]:
     """What of `x` is so many samples later than `y`, and the `y` beside it; time is the first axis."""
     return (x[lag:], y[: len(y) - lag]) if lag >= 0 else (x[:lag], y[-lag:])
+
+
+def _torque_shifted(plant: Actuator, s: Signals, terms: Array, lag: int) -> tuple[Array, Array]:
+    """The torque of currents that are so many samples later than the rotor, which commutates them, and its `terms`."""
+    i, theta_m = _shifted(s.i[0].T, s.theta_m[0], lag)
+    tau = motor_torque(plant, replace(s, i=i.T[None], theta_m=theta_m[None]))[0][0]
+    return tau, _shifted(s.i[0].T, terms, lag)[1]
