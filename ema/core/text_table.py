@@ -117,10 +117,10 @@ def _dialect(texts: list[str], side: Sidecar) -> Dialect:
     delimiter = side.delimiter
     if delimiter is None:
 
-        def fit(candidate: str) -> tuple[int, int]:
+        def fit(candidate: str) -> tuple[int, bool, int]:
             split = Dialect(candidate, ".").split
-            n = len(split(texts[0]))
-            return (sum(len(split(text)) == n for text in texts[1:]) if n > 1 else 0, n)
+            n = len(split(texts[0]))  # white space may also stand around what parts the fields, as in "0 | 1"
+            return (sum(len(split(text)) == n for text in texts[1:]) if n > 1 else 0, candidate != " ", n)
 
         delimiter = max(_DELIMITERS, key=fit)
         if fit(delimiter)[0] == 0:

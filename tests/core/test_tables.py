@@ -32,6 +32,7 @@ TEXTS = {
     "tab and decimal comma": ["t [s]\ti_q [A]\tw_m [rad/s]", *rows("\t", ",")],
     "white space": ["t(s)   i_q(A)  w_m(rad/s)", *rows("   ")],
     "spaces about the titles": [" t [s] , i_q [A] ,  w_m [rad/s]", *rows(", ")],
+    "spaces about bars": ["t(s) | i_q(A) | w_m(rad/s)", *rows(" | ")],
     "units in round brackets": ["t (s),i_q (A),w_m (rad/s)", *rows(",")],
     "a row of units": ["t,i_q,w_m", "s,A,rad/s", *rows(",")],
     "a row of units in brackets": ["t;i_q;w_m", "[s];[A];[rad/s]", *rows(";")],

@@ -59,8 +59,18 @@ def test_rigid_body_terms_of_both_joints_are_those_of_the_arm(arm):
 
 
 def test_friction_on_the_sum_of_both_speeds_is_named(arm):
-    found, _, _ = arm(on_sum=0.3)
+    found, _, plants = arm(on_sum=0.3)
     term = {t["name"]: t for t in found["elbow"]["terms"]}["coupled_friction"]
     assert "sum" in term["sentence"]
     assert term["confidence"] > 0.9
     assert term["parameters"]["dry"]["value"] == pytest.approx(0.3, rel=0.2)
+    said = rule_by_balance(plants["elbow"], SimpleNamespace(verdict="unexplained"))
+    assert [e.name for e in said.effects] == ["linked_axis", "coupled_friction"]
+    assert said.rest == 0.0 or said.rest == said.left.residual.rest  # of the balance, not of free runs
+
+
+def test_free_runs_that_know_no_neighbour_are_asked_for_no_cause(arm):
+    _, _, plants = arm()
+    plant = plants["elbow"]
+    blocks = range(len(plant.blocks))
+    assert plant.candidates({}, blocks) == plant.structure({}, blocks) == []

@@ -44,7 +44,11 @@ def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     if all(w.static for w in plant.windows):
         return examine(plant, progress)
     progress("the drive between samples")
-    plant.between = _of_plain(plant)
+    plant.between = _of_balance(plant) if plant.is_linked else _of_plain(plant)
+    if plant.is_linked:
+        outcome = examine(plant, progress)
+        outcome.notes += [SAID[plant.between]] if plant.between in SAID else []
+        return outcome
     reread = Rereading(plant, progress)
     outcome = examine(plant, progress, reread)
     here = plant.between
@@ -141,6 +145,21 @@ def _of_plain(plant: AxisPlant) -> str:
     best = min(tried, key=lambda way: tried[way].rms)
     much = above_noise(tried[best]) < MUCH * above_noise(straight)
     return best if much and compare(tried[best], straight).is_clear else "straight"
+
+
+def _of_balance(plant: AxisPlant) -> str:
+    """The way by which the balance leaves clearly least of held-out blocks, or straight, where free runs know little."""
+
+    def left(way: str) -> Tried:
+        plant.between = way
+        assert plant.balance is not None
+        of, rows = plant.balance.model, plant.balance.model.rows
+        scaled = (of.held_out / rows.sigma)[np.newaxis]
+        return Tried((), (), (), tuple(scaled[:, rows.whole & (rows.block == k)] for k in range(rows.n_blocks)))
+
+    ways = {way: left(way) for way in LATE}
+    best = min(ways, key=lambda way: ways[way].rms)
+    return best if compare(ways[best], ways["straight"]).is_significant else "straight"
 
 
 def _ways(plant: AxisPlant) -> tuple[str, ...]:

@@ -114,11 +114,18 @@ class AxisPlant:
 
     def candidates(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Library effects with bounds and starts for this axis."""
+        if self.is_linked:
+            return []
         return [*candidates.library(self, point, blocks), *suggest_by_balance(self.balance, self.plant, point)]
 
     def structure(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Terms that the torque residual along the measured motion suggests."""
-        return structure.search(self, point, blocks)
+        return [] if self.is_linked else structure.search(self, point, blocks)
+
+    @property
+    def is_linked(self) -> bool:
+        """Whether a neighbour is declared, of which free runs know nothing: what would fit them best is no cause."""
+        return self.balance is not None and bool(self.balance.given)
 
     def errors(self, point: Point, blocks: Sequence[int], fitted: Fitted | None = None) -> Errors:
         """Free-run error of the main output over its rms about the window's mean, pooled over records.

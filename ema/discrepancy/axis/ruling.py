@@ -16,12 +16,14 @@ import numpy as np
 from ema.core.records import Array
 from ema.discrepancy import findings as shared
 from ema.discrepancy.folds import Folds
-from ema.discrepancy.grade import UPPER, Left
+from ema.discrepancy.grade import NAMED, UPPER, Left
 from ema.discrepancy.outcome import Outcome
 from ema.models.axis_config import LinearAxis
 
 from .balance.as_effects import effects, point
 from .balance.found import Balance, draw
+from .balance.law import Law
+from .balance.links import COUPLED
 from .balance.needed import ALARM, chance
 from .balance.regression import regress
 from .balance.telling import of_law
@@ -45,6 +47,11 @@ class Ruling:
     why: str
 
     @property
+    def rest(self) -> float:
+        """How many times the noise is left in the balance; 0 where that is chance."""
+        return 0.0 if self.left.is_chance else self.left.residual.rest
+
+    @property
     def note(self) -> str:
         """For the reader of the verdict."""
         return f"the verdict and the gain are of the balance of torque, not of free runs: {self.why}"
@@ -56,7 +63,8 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
     if b is None:
         return None
     if b.given:
-        own = [_neighbour(b)] if _is_seen(b) else []
+        own = [_of_neighbour(b, b.given[0], _share_of_rest(b, b.given[0]))] if _is_seen(b) else []
+        own += [_of_neighbour(b, t.law, b.of_set(t)) for t in b.terms if t.law.name == COUPLED and b.of_set(t) >= NAMED]
         return Ruling([*own, *name_laws(plant, b, find_missing(b, []))], _measure_left(plant, b), NEIGHBOUR)
     is_blind = outcome.verdict == "adequate" and outcome.heldout.noise_floor > WITNESS
     named = find_missing(b, []) if is_blind else []
@@ -106,19 +114,21 @@ def _is_seen(b: Balance) -> bool:
     return chance(b.model, without, b.given) < ALARM
 
 
-def _neighbour(b: Balance) -> shared.FoundEffect:
-    """The declared neighbour as a cause: its mark over that and the rest is how sure it is."""
-    (law,) = b.given
-    told = of_law(b, law, draw(b))
+def _share_of_rest(b: Balance, law: Law) -> float:
+    """How sure the declared neighbour is: its mark over that and what is more than noise."""
     without = regress(b.model.rows, b.plain, [own for own in b.model.laws if own is not law])
     mark = (without.loss - b.model.loss) / max(int(b.model.rows.whole.sum()), 1)
-    sure = max(mark, 0.0) / max(mark + b.left - b.noise, 1e-300)
-    parameters = {name: shared.Quantity(**q) for name, q in told["parameters"].items()}
+    return max(mark, 0.0) / max(mark + b.left - b.noise, 1e-300)
+
+
+def _of_neighbour(b: Balance, law: Law, sure: float) -> shared.FoundEffect:
+    """What the neighbour does to this axis as a cause, of which the axis model knows nothing."""
+    told = of_law(b, law, draw(b))
     return shared.FoundEffect(
         told["name"],
         round(min(sure, 1.0), 4),
         (),
-        parameters,
+        {name: shared.Quantity(**q) for name, q in told["parameters"].items()},
         told["sentence"],
         law.separated_by,
         in_every_record=False,

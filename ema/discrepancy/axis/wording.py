@@ -90,7 +90,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     found = add_external(plant, found)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
     notes += [f"implausible: {text}" for text in find_implausible(plant, outcome)]
-    notes += _moved(plant, outcome) + _kinds(plant) + list(ripple.describe(plant)) + _zeros(plant, outcome)
+    notes += (_moved(plant, outcome) if rules is None else []) + _kinds(plant) + list(ripple.describe(plant)) + _zeros(plant, outcome)
     return shared.Findings(
         verdict,
         found,
@@ -100,7 +100,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         notes,
         [asdict(r) for r in outcome.records],
         _fitted(plant, outcome) if by_balance is None else _by_balance(plant, by_balance),
-        rest=outcome.rest,
+        rest=outcome.rest if rules is None else rules.rest,
         rejected=_rejected(plant, outcome, {name for e in found for name in (e.name, *e.indistinguishable_from)}),
         posterior=outcome.posterior if by_runs else [],
         balance=said,

@@ -84,6 +84,8 @@ def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
             known.append(Known(key, "1 ohm", "a guess: give --R"))
         elif key == "V_dc" and drive == "duty" and "u_dc" not in have:
             known.append(Known(key, "24 V", "a guess: give --supply"))
+    if "theta_n" in have:
+        known.append(Known("neighbour", "inner", "a guess: outer where theta_n is of the link that hangs on this one"))
     fit = first_fit(records, position, speed, _torques(records, drive, position, speed, sheet, k_t, k_e))
     return [*known, *_mechanical(fit, sheet, drive, linear=linear)]
 

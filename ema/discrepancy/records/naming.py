@@ -21,7 +21,9 @@ _PHASE = {"a": "i_a", "b": "i_b", "c": "i_c", "u": "i_a", "v": "i_b", "w": "i_c"
 _PHASES = re.compile(r"(?:i|cur|current|phase|iphase|i ?phase)[ _]*([abcuvw])$")
 _DRIVES = ("current", "force", "torque", "duty")
 _SHARES = {"%", "percent", "pct", "per cent"}
-_WRITTEN = {"u/min": "rpm", "1/min": "rpm", "min-1": "rpm", "grad": "deg"}  # as a proposal; a file's own is not read so
+_WRITTEN = {  # as a proposal; a file's own is not read so
+    "u/min": "rpm", "1/min": "rpm", "min-1": "rpm", "grad": "deg", "dps": "deg/s", "rps": "turn/s", "c": "°C", "degc": "°C",
+}  # fmt: skip
 _COUNTS = {"count", "counts", "ticks", "cnt", "cnts", "inc", "increments", "lsb"}
 # What is measured, by its unit where the file gives one, else by the words of the title.
 _UNITS = {
@@ -72,7 +74,10 @@ def propose(table: Table) -> list[Proposal]:
         elif channel is None:
             found[index] = Proposal(title, None, None, "no channel of an axis or an actuator by its title and unit")
         elif channel in taken:
-            found[index] = Proposal(title, None, None, f"looks like {channel} too, as '{taken[channel]}' does")
+            said = f"looks like {channel} too, as '{taken[channel]}' does"
+            if channel == "theta_m":
+                said += f"; of a neighbouring axis it would be {{channel: theta_n, unit: {unit or 'rad'}}}"
+            found[index] = Proposal(title, None, None, said)
         else:
             taken[channel] = title
             said = CHANNELS[channel].meaning
@@ -149,9 +154,10 @@ def _ending(title: str, what: str) -> str | None:
     if len(parts) > 2 and any(_converts("/".join(parts[-2:]), _UNITS[rate]) for rate in ("turning", "speed")):
         return "/".join(parts[-2:])  # joint_vel_deg_s
     its = _UNITS.get(what, "")  # a single letter is a phase more often than a unit, but for what it is the unit of
-    long = len(parts[-1]) > 1 or (bool(its) and _converts(parts[-1], its))
-    known = len(parts) > 1 and long and any(_converts(parts[-1], unit) for unit in _UNITS.values())
-    return parts[-1] if known else None
+    last = _written(parts[-1]) or ""
+    long = len(parts[-1]) > 1 or (bool(its) and _converts(last, its))
+    known = len(parts) > 1 and long and any(_converts(last, unit) for unit in _UNITS.values())
+    return last if known else None
 
 
 def _converts(unit: str, target: str) -> bool:

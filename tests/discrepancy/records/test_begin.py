@@ -41,6 +41,15 @@ def test_what_nobody_said_is_marked_as_a_guess(tmp_path):
     assert "a guess" in line
 
 
+def test_a_neighbour_that_was_recorded_is_declared_and_marked_as_a_guess(tmp_path):
+    record = bench()
+    cycles = [Cycle(c.number, {**c.channels, "theta_n": np.sin(c["t"])}) for c in record.cycles]
+    path = init(Record(tuple(cycles)), tmp_path, "--k-t", str(K_T))
+    assert axis_config.load(path).neighbour == "inner"
+    (line,) = [line for line in path.read_text().splitlines() if line.startswith("neighbour")]
+    assert "a guess: outer where" in line
+
+
 def test_an_actuator_gets_its_gear_and_pole_pairs_from_the_record(hidden, tmp_path):
     cycles = hidden.cycles(hidden.Flaws(), 1, 1, motions=(hidden.chirp(),))
     path = init(Record(tuple(Cycle(n, channels) for n, channels in enumerate(cycles))), tmp_path)

@@ -59,6 +59,13 @@ def channels(answer):
             },
         ),
         (
+            "stamp_us,motor_vel_dps,motor_current_A,case_temp_C", "",
+            {
+                "stamp_us": ("t", "us"), "motor_vel_dps": ("w_m", "deg/s"), "motor_current_A": ("i_q", "A"),
+                "case_temp_C": ("temp_w", "°C"),
+            },
+        ),
+        (
             "t_s,Phase A,Phase B,Phase C,rotor angle (deg),lvdt (deg),cmd (deg),Temp (°C)", "",
             {
                 "t_s": ("t", "s"), "Phase A": ("i_a", "A"), "Phase B": ("i_b", "A"), "Phase C": ("i_c", "A"),
@@ -129,6 +136,7 @@ def test_a_second_column_of_a_kind_is_left_out_and_said(tmp_path):
     _, answer = mapped(tmp_path, "t [s],position 1 [rad],position 2 [rad],i_q [A]")
     assert channels(answer)["position 2 [rad]"] == "ignore"
     assert "looks like theta_m too, as 'position 1 [rad]' does" in answer.stdout
+    assert "of a neighbouring axis it would be {channel: theta_n, unit: rad}" in answer.stdout
 
 
 def test_what_is_written_is_read_and_not_written_over(tmp_path):

@@ -22,6 +22,7 @@ from .law import Acting, Columns, Law
 from .motion import Motion
 
 LINKS = "links"
+COUPLED = "coupled_friction"
 
 
 def coupled_friction(unit: str) -> Iterator[Law]:
@@ -30,7 +31,7 @@ def coupled_friction(unit: str) -> Iterator[Law]:
         yield Law(
             "coupled friction",
             f"friction on the {said} of speeds",
-            "coupled_friction",
+            COUPLED,
             _on_both(side),
             {"dry": unit, "viscous": f"{unit} s/rad"},
             lambda c: {"dry": float(c[0]), "viscous": float(c[1])},
