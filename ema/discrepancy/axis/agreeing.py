@@ -50,7 +50,7 @@ def merge(
         b = balance_beside(plant, point)
     added = find_missing(b, out) if b is not None else []
     if b is not None and follows:
-        added = [_limit(t, measure_support(plant, point, b, t)) for t in added]
+        added = [_limit(t, share) for t, share in zip(added, measure_support(plant, point, b, added), strict=True)]
         added = [t for t in added if b.of_set(t) >= NAMED]
     if b is None or not added:
         return out, None

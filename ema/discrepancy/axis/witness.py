@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.records import Array
-from ema.discrepancy.fitting import WILD, best_fit, fit
+from ema.discrepancy.fitting import WILD, fit
 from ema.discrepancy.plant import Point
 
 from .balance.as_effects import effects, errors
@@ -31,16 +31,25 @@ def excess(residuals: Sequence[Array]) -> float:
     return max(float(np.mean(np.clip(r, -WILD, WILD) ** 2)) - 1.0, 0.0)
 
 
-def measure_support(plant: AxisPlant, point: Point, b: Balance, term: Term) -> float:
-    """Share of the rest that a law takes in free runs at `point`, over what it takes in the balance; 0 to 1."""
+def measure_support(plant: AxisPlant, point: Point, b: Balance, terms: Sequence[Term]) -> list[float]:
+    """For each law the share of the rest that it takes in free runs, over what it takes in the balance; 0 to 1.
+
+    Both beside the others of `terms`, and with what free runs found at `point` fitted again: it stood for them too.
+    """
     blocks = list(range(len(plant.blocks)))
-    without = fit(plant, plant.base, point, blocks, max_iterations=N_ITERATIONS)
-    here = excess(without.residuals)
-    taken, unsure = 0.0, errors(b, term)
-    for name, values in effects(b, term).items():
-        law = begin_at(name, values, unsure.get(name, {}))
-        starts = [{**point, **start} for start in law.starts]
-        fitted = best_fit(plant, [*plant.base, *law.free], starts, blocks, max_iterations=N_ITERATIONS)
-        taken = max(taken, 1.0 - excess(fitted.residuals) / max(here, 1e-300))
-    promised = term.power / max(term.power + b.left - b.noise, 1e-300)
-    return min(max(taken, 0.0) / promised, 1.0)
+    known = plant.candidates({f.name: f.start for f in plant.base}, blocks)
+    found = {f.name: f for f in (*plant.base, *(f for c in known for f in c.free)) if f.name in point}
+
+    def leave(laws: Sequence[Term]) -> float:
+        """What is left beside noise."""
+        of = [begin_at(name, own, errors(b, t).get(name, {})) for t in laws for name, own in effects(b, t).items()]
+        free = found | {f.name: f for law in of for f in law.free}
+        start = {**point, **{name: value for law in of for name, value in law.starts[0].items()}}
+        return excess(fit(plant, list(free.values()), start, blocks, max_iterations=N_ITERATIONS).residuals)
+
+    full, support = leave(terms), []
+    for term in terms:
+        taken = 1.0 - full / max(leave([t for t in terms if t is not term]), 1e-300)
+        promised = term.power / max(term.power + b.left - b.noise, 1e-300)
+        support.append(min(max(taken, 0.0) / promised, 1.0))
+    return support
