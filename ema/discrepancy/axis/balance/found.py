@@ -96,6 +96,27 @@ class Balance:
 
 
 def draw(b: Balance) -> Array:
-    """Coefficients drawn from their uncertainty, shape (N_DRAWS, n)."""
+    """Coefficients drawn from their uncertainty, shape (N_DRAWS, n): also from what the balance cannot tell from a law.
+
+    With another law in the place of one, as often as it wins, the rest are what they are beside that one.
+    """
     rng = np.random.default_rng(0)
-    return rng.multivariate_normal(b.corrected.coefficients, b.corrected.covariance, N_DRAWS, method="eigh")
+    out = rng.multivariate_normal(b.corrected.coefficients, b.corrected.covariance, N_DRAWS, method="eigh")
+    for term in b.terms:
+        lots = rng.random(N_DRAWS)
+        for rival, wins in zip(term.instead, term.alike.values(), strict=True):
+            out[lots < wins] += _moved(b.model, rival)
+            lots = np.where(lots < wins, 2.0, lots - wins)
+    return np.asarray(out)
+
+
+def _moved(model: Regression, rival: Regression) -> Array:
+    """By how much the coefficients that both have differ; 0 of those that the rival has not."""
+    out = np.zeros(len(model.coefficients))
+    theirs = {law.key for law in rival.laws}
+    for law in model.laws:
+        if law.key in theirs:
+            out[model.part(law)] = rival.coefficients[rival.part(law)] - model.coefficients[model.part(law)]
+    if model.base == rival.base:
+        out[: len(model.base)] = rival.coefficients[: len(model.base)] - model.coefficients[: len(model.base)]
+    return out
