@@ -27,7 +27,7 @@ ALONE = " (shown by the balance along the measured motion, not by free runs)"
 def find_missing(b: Balance, found: Sequence[shared.FoundEffect]) -> list[Term]:
     """Likely laws that the library has as effects, and that nothing found stands for."""
     told = {name for e in found for name in (e.name, *e.indistinguishable_from)}
-    new = [term for term in b.terms if (name := name_law(b, term)) and not {name, *term.law.also} & told]
+    new = [term for term in b.terms if (name := name_law(b, term)) and not {name, *term.unseen} & told]
     return [term for term in new if b.of_set(term) >= NAMED]
 
 
@@ -54,7 +54,7 @@ def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.Found
             spread = value + np.angle(np.exp(1j * (spread - value)))
         low, high = np.percentile(spread, INTERVAL)
         parameters[key] = shared.Quantity(value, float(low), float(high), units[key])
-    others = tuple(sorted({*term.alike, *term.law.also}))
+    others = term.others
     confidence = round(b.of_set(term) / (1 + len(others)), 4)  # those in a set share what is sure of it
     return shared.FoundEffect(
         name, confidence, others, parameters, said(effect.said(values)) + ALONE, said(effect.separated_by)

@@ -37,6 +37,16 @@ class Term:
     common: float
     instead: tuple[Regression, ...] = ()
 
+    @property
+    def unseen(self) -> set[str]:
+        """Effects that no balance tells from this law, or from what does as well."""
+        return {name for law in (self.law, *(r.laws[-1] for r in self.instead)) for name in law.also}
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """What this balance cannot tell from the law."""
+        return tuple(sorted({*self.alike, *self.unseen} - {self.law.name}))
+
 
 @dataclass(frozen=True)
 class Balance:

@@ -87,7 +87,7 @@ def _term(b: Balance, term: Term, samples: Array) -> dict[str, Any]:
     out = {
         **of_law(b, term.law, samples),
         "confidence": round(b.confidence(term), 4),
-        "indistinguishable_from": sorted({*term.alike, *term.law.also}),
+        "indistinguishable_from": list(term.others),
         "separated_by": term.law.separated_by,
         "share": _short(term.power / b.drive),
     }
