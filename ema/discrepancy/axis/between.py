@@ -47,7 +47,7 @@ def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     plant.between = _of_balance(plant) if plant.is_linked else _of_plain(plant)
     if plant.is_linked:
         outcome = examine(plant, progress)
-        outcome.notes += [SAID[plant.between]] if plant.between in SAID else []
+        outcome.notes.extend([SAID[plant.between]] if plant.between in SAID else [])
         return outcome
     reread = Rereading(plant, progress)
     outcome = examine(plant, progress, reread)
@@ -148,7 +148,7 @@ def _of_plain(plant: AxisPlant) -> str:
 
 
 def _of_balance(plant: AxisPlant) -> str:
-    """The way by which the balance leaves clearly least of held-out blocks, or straight, where free runs know little."""
+    """The way by which the balance leaves clearly least of held-out blocks, or straight: free runs know too little."""
 
     def left(way: str) -> Tried:
         plant.between = way

@@ -90,7 +90,8 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     found = add_external(plant, found)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
     notes += [f"implausible: {text}" for text in find_implausible(plant, outcome)]
-    notes += (_moved(plant, outcome) if rules is None else []) + _kinds(plant) + list(ripple.describe(plant)) + _zeros(plant, outcome)
+    notes += _moved(plant, outcome) if rules is None else []
+    notes += _kinds(plant) + list(ripple.describe(plant)) + _zeros(plant, outcome)
     return shared.Findings(
         verdict,
         found,

@@ -22,7 +22,8 @@ _PHASES = re.compile(r"(?:i|cur|current|phase|iphase|i ?phase)[ _]*([abcuvw])$")
 _DRIVES = ("current", "force", "torque", "duty")
 _SHARES = {"%", "percent", "pct", "per cent"}
 _WRITTEN = {  # as a proposal; a file's own is not read so
-    "u/min": "rpm", "1/min": "rpm", "min-1": "rpm", "grad": "deg", "dps": "deg/s", "rps": "turn/s", "c": "°C", "degc": "°C",
+    "u/min": "rpm", "1/min": "rpm", "min-1": "rpm", "grad": "deg", "dps": "deg/s", "rps": "turn/s",
+    "c": "°C", "degc": "°C",
 }  # fmt: skip
 _COUNTS = {"count", "counts", "ticks", "cnt", "cnts", "inc", "increments", "lsb"}
 # What is measured, by its unit where the file gives one, else by the words of the title.
