@@ -118,13 +118,19 @@ def _best_of(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
 def _best_members(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) -> Regression:
     """With that member of each family that fits best beside the laws that came after it.
 
-    What acts on friction by load depends on its size: of such a family each member is fitted to the end.
+    What acts on friction by load depends on its size: of such a family each member is fitted to the end. One of another
+    name takes the place of a law that seldom leaves less.
     """
     for law in [own for own in model.laws if own.family not in LINES]:
         without = regress(found, plain, [own for own in model.laws if own.key != law.key])
         members = [own for own in every if own.family == law.family] or [law]
-        tried = members if law.needs_acting else [_best(found, without, members)]
-        model = min(model, *(regress(found, plain, _add(without, own)) for own in tried), key=lambda r: r.loss)
+        same = [own for own in members if own.name == law.name]
+        other = regress(found, plain, _add(without, _best(found, without, same or [law])))
+        model = other if other.loss < model.loss else model
+        for own in members if law.needs_acting else ():
+            other = regress(found, plain, _add(without, own))
+            if _wins(law.name, model, {own.key: other})[law.name] <= SELDOM:
+                model = other
     return model
 
 

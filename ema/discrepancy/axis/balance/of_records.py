@@ -67,11 +67,15 @@ def balance(plant: Measured) -> Balance | None:
     assert answer is not None
     assert widths is not None
     for _ in range(N_WIDER):
-        wide = {name: 2.0 * half for name, half in widths.items()}
-        slower = integrate_rows(plant, recorded, wide, unsure)
-        if slower is None or _has_no_room(recorded, wide) or not _is_moved(answer.model, slower, plain):
+        wide = dict(widths)
+        for name, half in widths.items():  # what swings besides in one record says nothing of another
+            own = {**widths, name: 2.0 * half}
+            slower = integrate_rows(plant, recorded, own, unsure)
+            if slower is not None and not _has_no_room(recorded, own) and _is_moved(answer.model, slower, plain):
+                wide[name] = own[name]
+        if wide == widths:
             break
-        found, widths = slower, wide
+        found, widths = integrate_rows(plant, recorded, wide, unsure) or found, wide
         answer = choose_laws(found, plain, shown_by(found, list(every_law(found, linear=linear))), given(found))
     return replace(
         answer,
