@@ -22,7 +22,7 @@ from .agreeing import merge
 from .balance.as_effects import effects, point
 from .balance.found import Balance
 from .balance.telling import describe, sentences
-from .between import examine_ways
+from .between import SAID, examine_ways
 from .closed_loop import closed_loop
 from .dropped import list_dropped
 from .external import add_external
@@ -80,7 +80,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         found, verdict = rules.effects, grade(rules.left, named=bool(rules.effects))
         by_balance: Balance | None = plant.balance
         gain = shared.Gain(**of_balance(plant.balance, rules.left, outcome, isinstance(plant.plant, LinearAxis)))
-        notes, structure = [rules.note], {}
+        notes, structure = [rules.note, *(note for note in notes if note in SAID.values())], {}
     else:
         follows = outcome.heldout.noise_floor <= WITNESS
         told_by_runs = [_effect(e) for e in outcome.effects]

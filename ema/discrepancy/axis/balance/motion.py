@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,3 +39,13 @@ class Motion:
     dT: Array = field(default_factory=lambda: np.empty(0))
     gear_orders: tuple[float, ...] = ()
     turns: float = 1.0
+
+    @cached_property
+    def sweep(self) -> Array:
+        """The way from one sample to the next, at the usual rate of each record. [rad or m]"""
+        out = np.zeros(len(self.t))
+        for k in np.unique(self.record):
+            own = self.record == k
+            steps = np.diff(self.t[own])
+            out[own] = self.w[own] * float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+        return out
