@@ -105,7 +105,7 @@ class AxisPlant:
         """Zero where the plant file declares the noise of every channel that is compared; large where none has any."""
         if all(noise.declared for b in self.benches for noise in b.noise.values()):
             return 0.0
-        compared = [b.noise[name] for b in self.benches for name in b.roles.outputs]
+        compared = [b.noise[name] for b in self.benches for name in (b.noise if b.static else b.roles.outputs)]
         return BOUND if all(noise.is_bound for noise in compared) else ESTIMATE_UNCERTAINTY
 
     def residuals(self, points: Sequence[Point], blocks: Sequence[int]) -> list[list[Array]]:
