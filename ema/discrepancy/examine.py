@@ -13,7 +13,18 @@ from .held_out import by_record, over_folds, residual_over_folds, training_gain
 from .outcome import Gain, Outcome
 from .plant import Plant
 from .progress import Progress
-from .rounds import Reread, State, judge_model, leave_out, never, revise, select, try_library_alone
+from .rounds import (
+    Reread,
+    State,
+    Together,
+    judge_model,
+    leave_out,
+    never,
+    revise,
+    select,
+    try_library_alone,
+    try_together,
+)
 from .selection import FORM, above_noise, compare, fit_base, is_nameless
 from .trust import describe_effects, drop_unlikely
 from .weighing import Weighed
@@ -21,8 +32,16 @@ from .weighing import Weighed
 MIMICKED = 0.02  # of an effect's mark in power, where less is left of it beside the base parameters it cannot be seen
 
 
-def examine(plant: Plant, progress: Progress | None = None, reread: Reread | None = None) -> Outcome:
-    """Examine a plant with its records; `reread` says where these are to be taken another way (`rounds.State`)."""
+def examine(
+    plant: Plant,
+    progress: Progress | None = None,
+    reread: Reread | None = None,
+    together: Together | None = None,
+) -> Outcome:
+    """Examine a plant with its records.
+
+    `reread` says where these are to be taken another way (`rounds.State`), `together` which effects to begin with too.
+    """
     progress = progress or Progress()
     everything = list(range(len(plant.blocks)))
     progress("nominal model")
@@ -33,6 +52,8 @@ def examine(plant: Plant, progress: Progress | None = None, reread: Reread | Non
     select(plant, state, progress)
     revise(plant, state, progress)
     state = try_library_alone(plant, state, progress)
+    if together is not None:
+        state = try_together(plant, state, together, progress)
     trust, weighed = drop_unlikely(plant, state, progress)
     plain = state.plain
     verdict = judge_model(plant, plain)

@@ -9,7 +9,18 @@ from typing import Any
 from .grade import LIMIT
 from .plant import Candidate, Plant, Point
 from .progress import Progress
-from .selection import FORM, Tried, above_noise, choose, compare, fit_base, fit_model, fit_with_each, is_worth_it
+from .selection import (
+    FORM,
+    N_FOLDS,
+    Tried,
+    above_noise,
+    choose,
+    compare,
+    fit_base,
+    fit_model,
+    fit_with_each,
+    is_worth_it,
+)
 from .verdict import Verdict, judge
 
 MAX_EFFECTS = 3
@@ -22,6 +33,10 @@ N_RIVALS = 6
 
 Reread = Callable[[Tried, Tried], bool]
 """Reads the records another way where a model then foretells them better than one with a further effect does."""
+
+
+Together = Callable[[Point], Sequence[Candidate]]
+"""Effects that something else than a simulation shows beside each other, at a point without effects."""
 
 
 def never(model: Tried, further: Tried) -> bool:
@@ -119,6 +134,30 @@ def try_library_alone(plant: Plant, state: State, progress: Progress) -> State:
     return other if few and as_well else state
 
 
+def try_together(plant: Plant, state: State, together: Together, progress: Progress) -> State:
+    """Effects that were seen beside each other, where those found one by one leave more than noise.
+
+    Of two that are there, neither alone may foretell much, and a third that is not there does what they have in common.
+    """
+    if is_explained(plant, state.plain, state.model):
+        return state
+    found = tuple(together(state.plain.fits[0].point))[:MAX_EFFECTS]
+    if len(found) < 2 or {c.key for c in found} <= {c.key for c in state.model.accepted}:
+        return state
+    progress("effects that the records show beside each other")
+    start = {name: value for c in found for name, value in c.starts[0].items()}
+    model = fit_model(plant, [found] * N_FOLDS, [[{**own.point, **start}] for own in state.plain.fits])
+    if not is_worth_it(model, state.plain):
+        return state
+    other = State(
+        state.plain, model, [({}, state.plain)] * len(found), state.tried, state.n_rounds, reread=state.reread
+    )
+    revise(plant, other, progress)
+    select(plant, other, progress)
+    revise(plant, other, progress)
+    return other if compare(other.model, state.model).is_significant else state
+
+
 def _strongest(trials: dict[str, Tried], before: Tried) -> set[str]:
     gains = {key: compare(trial, before).gain for key, trial in trials.items()}
     return set(sorted(gains, key=lambda key: -gains[key])[:N_RIVALS])
@@ -163,7 +202,7 @@ def revise(plant: Plant, state: State, progress: Progress) -> None:
             state.rounds[k] = (state.rounds[k][0], reduced)
             k += 1
             continue
-        many = len(reduced.fits[0].free) > MANY
+        many = bool(trials) and len(reduced.fits[0].free) > MANY
         rivals = _strongest(state.rounds[k][0], state.rounds[k][1]) if many else None
         trials = _round(plant, state, reduced, progress, rivals)
         trials[own.key] = state.model

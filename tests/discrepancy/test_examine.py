@@ -183,3 +183,35 @@ def test_noise_is_told_from_what_is_larger_or_correlated():
     moving = list((x[..., 1:] + 0.3 * x[..., :-1]) / np.sqrt(1.09))
     assert correlation_test(moving) < 1e-6
     assert "correlated" in judge(moving).because or not judge(moving).is_noise
+
+
+class Opposed(Toy):
+    """`a` and `b` do the opposite, but for a tenth: what both leave is all that is seen of them."""
+
+    def __init__(self, seed: int, **hidden: float):
+        super().__init__(seed)
+        common, *own = (self.columns[name].copy() for name in ("a", "b", "k"))
+        self.columns |= {"a": 10.0 * common + own[0], "b": own[1] - 10.0 * common}
+        self.columns["k"] = np.random.default_rng(seed + 1000).standard_normal(common.shape)
+        self.y = QUIET * np.random.default_rng(seed).standard_normal(common.shape)
+        self.y = self.y + sum(size * self.columns[name] for name, size in hidden.items())
+
+    def seen_together(self, point):
+        return self.candidates(point, range(N_BLOCKS))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_effects_of_which_neither_alone_foretells_much_are_found_where_both_are_seen(seed):
+    toy = Opposed(seed, a=2.0, b=2.0)
+    assert examine(toy).effects == []
+    found = examine(toy, together=toy.seen_together)
+    assert {e["name"] for e in found.effects} == {"a", "b"}
+    assert found.verdict == "explained"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_seen_together_and_is_not_there_is_not_named(seed):
+    toy = Opposed(seed, a=2.0)
+    assert {e["name"] for e in examine(toy, together=toy.seen_together).effects} == {"a"}
+    nothing = Opposed(seed)
+    assert examine(nothing, together=nothing.seen_together).verdict == "adequate"

@@ -50,7 +50,7 @@ def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
         outcome.notes.extend([SAID[plant.between]] if plant.between in SAID else [])
         return outcome
     reread = Rereading(plant, progress)
-    outcome = examine(plant, progress, reread)
+    outcome = examine(plant, progress, reread, plant.seen_together)
     here = plant.between
     there = _beside(plant, outcome)
     if there == here:
@@ -58,7 +58,7 @@ def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     if there != here:
         progress(f"again, with a drive that is {there} between samples")
         plant.between = there
-        other = examine(plant, progress, reread)
+        other = examine(plant, progress, reread, plant.seen_together)
         there = plant.between
         alike = plant.plant.drive == "speed-loop" and _alike(other, outcome)
         if _is_simpler(other, outcome):

@@ -29,7 +29,7 @@ from .noise import ESTIMATE_UNCERTAINTY
 from .noise_model import position_noise, whitener, without_start
 from .pack import Pack
 from .predictable import LONGEST_WINDOW, predictable_time
-from .screened import suggest_by_balance
+from .screened import begin_with_balance, suggest_by_balance
 from .undersampled import refuse_undersampled
 from .windows import Bench, Window, bench
 from .zeros import zeros
@@ -117,6 +117,11 @@ class AxisPlant:
         if self.is_linked:
             return []
         return [*candidates.library(self, point, blocks), *suggest_by_balance(self.balance, self.plant, point)]
+
+    def seen_together(self, point: Point) -> list[Candidate]:
+        """Effects that the balance of torque needs beside each other, begun where it has them."""
+        library = {c.key: c for c in candidates.library(self, point, range(len(self.blocks)))}
+        return begin_with_balance(self.balance, library)
 
     def structure(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Terms that the torque residual along the measured motion suggests."""

@@ -7,6 +7,9 @@ have both in a set with what the balance does not see.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 
 from ema.discrepancy.plant import Candidate, Free, Point
@@ -48,6 +51,24 @@ def suggest_by_balance(balance: Balance | None, plant: Axis, point: Point) -> li
             if not ({f.name for f in law.free} & point.keys() if name in LINES else name in have):
                 out.append(law)
     return out
+
+
+def begin_with_balance(balance: Balance | None, library: Mapping[str, Candidate]) -> list[Candidate]:
+    """Every law that the balance needs, begun there; with the library's own freedom where it has that effect."""
+    if balance is None:
+        return []
+    out: dict[str, Candidate] = {}
+    for term in balance.terms:
+        unsure = errors(balance, term)
+        for name, values in effects(balance, term).items():
+            law = begin_at(name, values, unsure.get(name, {}))
+            own = library.get(law.key)
+            if own is not None:
+                known = {f"{name}.{p}": value for p, value in values.items()}
+                start = {f.name: min(max(known.get(f.name, f.start), f.low), f.high) for f in own.free}
+                law = replace(own, starts=(start,))
+            out.setdefault(law.key, law)
+    return [*out.values()]
 
 
 def begin_at(name: str, values: dict[str, float], unsure: dict[str, float]) -> Candidate:
