@@ -100,11 +100,20 @@ class Rereading:
             tried[way] = refit(plant, model)
         plant.between = here
         best = max(tried, key=lambda way: compare(tried[way], model).gain)
-        if compare(tried[best], model).gain < ODDS or compare(tried[best], further).gain < 0.0:
+        if compare(tried[best], model).gain < ODDS or not _is_no_worse(tried[best], further):
             return False
         self._turns -= 1
         plant.between = best
         return True
+
+
+def _is_no_worse(taken: Tried, further: Tried) -> bool:
+    """Whether records taken another way foretell as much as with a further effect.
+
+    A lag of the drive is half a sample where it is held, and has a parameter to fit besides: it must be clearly better.
+    """
+    gain = compare(further, taken)
+    return not gain.is_clear if further.accepted[-1].effect == "drive_lag" else gain.gain <= 0.0
 
 
 def _find_doubt(plant: AxisPlant, outcome: Outcome) -> str:
@@ -172,7 +181,7 @@ def _plain(plant: AxisPlant, way: str) -> Tried:
 
 
 def _beside(plant: AxisPlant, outcome: Outcome) -> str:
-    """The likelier way, though nothing was fitted for it, or held where all sensors are half a sample late.
+    """The likelier way, though nothing was fitted for it, or held where sensors or the drive are half a sample late.
 
     It counts where nothing but noise is left too: taken for straight, a held drive is half a sample early, in a swing
     that is less drag than there is, and less drag is what tells a heavier axis from a drive that reads too much.
@@ -195,6 +204,7 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     seen = {name for b in plant.benches for name in b.roles.outputs}
     late = np.array([outcome.point.get(name, 0.0) for name, of in DELAYS.items() if seen & of]) / period
     by_half = len(late) > 0 and bool((np.abs(late - LATE["held"]) < NEARLY_HALF).all())
+    by_half |= abs(outcome.point.get(LAG, 0.0) / period - LATE["held"]) < NEARLY_HALF
     return "held" if here == "straight" and by_half else here
 
 

@@ -54,13 +54,18 @@ def suggest_by_balance(balance: Balance | None, plant: Axis, point: Point) -> li
 
 
 def begin_with_balance(balance: Balance | None, library: Mapping[str, Candidate]) -> list[Candidate]:
-    """Every law that the balance needs, begun there; with the library's own freedom where it has that effect."""
+    """Every law that the balance needs, begun there; with the library's own freedom where it has that effect.
+
+    But lines of torque, of which a search finds each in what the others leave.
+    """
     if balance is None:
         return []
     out: dict[str, Candidate] = {}
     for term in balance.terms:
         unsure = errors(balance, term)
         for name, values in effects(balance, term).items():
+            if name in LINES:
+                continue
             law = begin_at(name, values, unsure.get(name, {}))
             own = library.get(law.key)
             if own is not None:

@@ -97,9 +97,9 @@ def of_something_else(good):
         (without_current, "i_b is constant"),
         (geared_otherwise, "another plant"),
         (clipped, "i_a is clipped at 1 A"),
-        (apart, "the currents come .* position and command: channels are not synchronised"),
+        (apart, "the currents come 0.02 s after θ_m: channels are not synchronised"),
         (another_sign, "do not follow|not synchronised"),
-        (of_something_else, "the currents do not follow position and command"),
+        (of_something_else, "the currents do not follow θ_m"),
     ],
 )
 def test_what_does_not_belong_is_refused_with_its_reason(good, shipped_plant, change, why):
