@@ -44,11 +44,10 @@ def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     if all(w.static for w in plant.windows):
         return examine(plant, progress)
     progress("the drive between samples")
-    plant.between = _of_balance(plant) if plant.is_linked else _of_plain(plant)
     if plant.is_linked:
-        outcome = examine(plant, progress)
-        outcome.notes.extend([SAID[plant.between]] if plant.between in SAID else [])
-        return outcome
+        plant.between = _of_balance(plant)
+        return _say_way(plant, examine(plant, progress))
+    plant.between = _of_plain(plant)
     reread = Rereading(plant, progress)
     outcome = examine(plant, progress, reread, plant.seen_together)
     here = plant.between
@@ -72,9 +71,14 @@ def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
                 "the record does not show whether the speed loop acts between its samples too: intervals hold both"
             )
             return outcome
+    _widen_lag(plant, outcome)
+    return _say_way(plant, outcome)
+
+
+def _say_way(plant: AxisPlant, outcome: Outcome) -> Outcome:
+    """The outcome, with a note where the drive does not run straight."""
     if plant.between in SAID:
         outcome.notes.append(SAID[plant.between])
-    _widen_lag(plant, outcome)
     return outcome
 
 
