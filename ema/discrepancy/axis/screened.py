@@ -18,6 +18,7 @@ from ema.models.axis_config import LINES, Axis
 
 from .balance.as_effects import effects, errors, find_alternatives, line_point
 from .balance.found import Balance
+from .candidates import PRIOR
 
 SCREENED = (
     *("viscous_by_direction", "pendulum", "output_load_friction", "drive_unequal", "viscous_slope", "friction_slope"),
@@ -32,8 +33,9 @@ SCREENED = (
 )
 ROOM = 10.0  # times the size that the regression found, to which a fit may go
 FIXED = (  # parameters that the records of one bench hardly show
-    *("turns", "centre", "half", "over", "since", "coefficient", "damping", "shape"),
+    *("turns", "centre", "half", "over", "since", "damping", "shape"),
 )
+VAGUE = ("viscous_by_temperature.coefficient",)  # shown where records are warm enough to bend the law: else a prior
 
 
 def suggest_by_balance(balance: Balance | None, plant: Axis, point: Point) -> list[Candidate]:
@@ -101,6 +103,8 @@ def _candidate(name: str, values: dict[str, float], unsure: dict[str, float]) ->
             if size == 0.0:
                 continue  # nothing says how far it may go
             low = 0.0 if p.low == 0.0 else -ROOM * size
-            free.append(Free(f"{name}.{p.name}", p.unit, low, ROOM * size, value, 0.1 * size))
+            key = f"{name}.{p.name}"
+            prior = PRIOR * size if key in VAGUE else None
+            free.append(Free(key, p.unit, low, ROOM * size, value, 0.1 * size, prior=prior))
     start = {f"{name}.{key}": value for key, value in values.items()}
     return Candidate(name, name, tuple(free), (start,), {free[0].name: effect.neutral()[effect.parameters[0].name]})
