@@ -20,6 +20,7 @@ MOST_LINES = 16  # of one series: each takes a tenth at least of what those befo
 SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
 N_FINER = 5  # times that the step between members of a family is halved
 N_DRAWS = 400  # of blocks, to see how often a law wins
+EQUAL = 1e-9  # share by which rounding tells two columns apart that are one on these records: the first is taken
 
 
 def choose_laws(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence[Law] = ()) -> Balance:
@@ -112,7 +113,7 @@ def _best_of(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
     A -= (A @ q) @ q.T
     gram, b = A @ A.transpose(0, 2, 1), A @ left
     gains = np.einsum("mc,mcd,md->m", b, np.linalg.pinv(gram, rcond=1e-6, hermitian=True), b)
-    return members[int(np.argmax(gains))]
+    return members[int(np.argmax(gains >= (1.0 - EQUAL) * gains.max()))]
 
 
 def _best_members(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) -> Regression:
@@ -228,7 +229,8 @@ def _wins(name: str, model: Regression, rivals: Mapping[str, Regression]) -> dic
     losses = np.stack([model.losses, *(r.losses for r in rivals.values())])
     rng = np.random.default_rng(0)
     drawn = rng.multinomial(losses.shape[1], np.full(losses.shape[1], 1.0 / losses.shape[1]), N_DRAWS)
-    winners = np.argmin(losses @ drawn.T, axis=0)
+    left = losses @ drawn.T
+    winners = np.argmax(left <= (1.0 + EQUAL) * left.min(axis=0), axis=0)
     return {own: float(np.mean(winners == k)) for k, own in enumerate([name, *rivals])}
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ema.core.records import Array
 
-CHUNK = 20_000  # samples at a time
+CHUNK = 2_000  # samples at a time: what a processor's cache holds
 FEWEST = 7  # samples on a test function
 POWER = 4  # of a test function (1 - s²)^p: its first three derivatives vanish at its ends
 
@@ -30,13 +30,15 @@ def local_polynomial(t: Array, x: Array, half: int, degree: int) -> Array:
         here = t[a : a + CHUNK, None]
         span = np.maximum(times[rows, -1] - here[:, 0], here[:, 0] - times[rows, 0])[:, None]
         s = (times[rows] - here) / span
-        weight = 1.0 - 0.99 * s**2
-        powers = np.stack([s**k for k in range(degree + 1)], axis=2)
-        weighted = powers * weight[:, :, None]
-        turned = weighted.transpose(0, 2, 1)
-        normal = turned @ powers
-        right = (turned @ (values[rows] - x[a : a + CHUNK, None])[:, :, None])[:, :, 0]
-        c = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
+        y, weight = values[rows] - x[a : a + CHUNK, None], 1.0 - 0.99 * s * s
+        moments, right = np.empty((2 * degree + 1, len(rows))), np.empty((degree + 1, len(rows)))
+        for k in range(2 * degree + 1):  # weight is times s^k
+            moments[k] = weight.sum(axis=1)
+            if k <= degree:
+                right[k] = np.einsum("ij,ij->i", weight, y)
+            weight *= s
+        normal = moments[np.add.outer(np.arange(degree + 1), np.arange(degree + 1))].transpose(2, 0, 1)
+        c = np.linalg.solve(normal, right.T[:, :, None])[:, :, 0]
         c[:, 0] += x[a : a + CHUNK]
         factorial = 1.0
         for k in range(degree + 1):
