@@ -9,6 +9,7 @@ from typing import Any
 
 import axis_bench
 import axis_other
+import belt_bench
 import geared
 import hidden_axis
 import numpy as np
@@ -42,7 +43,8 @@ EXACT = {"cogging.amplitude", "asymmetric_friction.asymmetry", "constant_load.to
          "clock_skew.rate", "inertia.change", "drive_gain.gain", "drive_offset.offset",
          "viscous_by_direction.difference", "output_load_friction.share", "pendulum.amplitude",
          "quadratic_load_friction.per_square", "quadratic_output_load_friction.per_torque", "friction_drift.rate",
-         "viscous_drift.rate", "gear_error.amplitude", "external_torque.amplitude", "drive_lag.time"}  # fmt: skip
+         "viscous_drift.rate", "gear_error.amplitude", "external_torque.amplitude", "drive_lag.time",
+         "drive_compliance.compliance"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -232,20 +234,32 @@ def _other(number: int, seed: int, plant: str) -> Trial:
 
 
 def _loops(number: int, seed: int, plant: str) -> Trial:
-    """Speed and position loops: a servo's, a positioning table's cascade, a geared servo with a pendulum."""
+    """Speed and position loops: a servo's, a table's cascade, a geared servo with a pendulum, a belt seen behind it."""
     rng = np.random.default_rng(seed)
     s = seed % 100_000
-    kind = ("speed loop", "cascade", "pendulum")[number % 3]
+    kind = ("speed loop", "cascade", "pendulum", "belt")[number % 4]
     if kind == "speed loop":
-        change = float(rng.uniform(0.05, 0.3)) * (number // 3 % 2)
+        change = float(rng.uniform(0.05, 0.3)) * (number // 4 % 2)
         record = servo.record(s, samples=bool(rng.integers(2)), inertia=0.0085 * (1.0 + change))
         return _loop(kind, servo.SPEED_LOOP, record, {"inertia.change": change})
     if kind == "cascade":
-        return _cascade(number // 3, s, rng)
-    bench = positioner.Servo(by_load=float(rng.uniform(0.1, 0.3)) * (number // 3 % 2))
+        return _cascade(number // 4, s, rng)
+    if kind == "belt":
+        return _belt(number // 4 % 2 == 0, s, rng)
+    bench = positioner.Servo(by_load=float(rng.uniform(0.1, 0.3)) * (number // 4 % 2))
     record = positioner.servo(bench, s)
     found = {"pendulum.amplitude": bench.gravity, "output_load_friction.share": bench.by_load}
     return _loop(kind, positioner.servo_plant(bench), record, found)
+
+
+def _belt(gives: bool, s: int, rng: np.random.Generator) -> Trial:
+    """A pulley whose angle is recorded, behind a belt that gives or is stiffer than the record shows."""
+    b, frequency = belt_bench, float(rng.uniform(15.0, 35.0)) if gives else 400.0
+    record = b.record(float(rng.uniform(0.0, b.F_L)), at_load=True, frequency=frequency, seed=s)
+    plant_file = {"kind": "axis", "J": b.J_M + b.J_L, "F_d": b.F_M + b.F_L, "C": b.C, "k_t": b.K_T}
+    compliance = (b.FREQUENCY / frequency) ** 2 / b.STIFFNESS if gives else 0.0
+    found = {"drive_compliance.compliance": compliance}
+    return _loop("belt", {**plant_file, "measured_at": "load"}, record, found)
 
 
 def _cascade(number: int, s: int, rng: np.random.Generator) -> Trial:

@@ -103,7 +103,7 @@ def simulate(
     offsets : array, shape (n_windows + 1,)
         Window j is samples ``offsets[j]:offsets[j + 1]``.
     starts : array, shape (n_windows, 4)
-        True position and speed at each window's first sample, and by how much the load behind a gear that gives is
+        True position and speed at each window's first sample, and by how much what is beyond a gear that gives is
         behind in position and speed.
     dT : array, shape (n_windows,), optional
         Winding temperature less 20 °C. [K]
@@ -144,30 +144,34 @@ def holding(numbers: Model, theta: Array, direction: Array, t: Array) -> Array:
 
 def is_flexible(numbers: Model) -> bool:
     """Whether the gear gives, so that a window also begins with a twist."""
-    return bool(numbers.z[row("gear_compliance.compliance")] > 0.0)
+    return bool(max(numbers.z[row(f"{name}.compliance")] for name in ("gear_compliance", "drive_compliance")) > 0.0)
 
 
-def loads_after(
+def beyond_after(
     numbers: Model,
+    drive: str,
     offsets: NDArray[np.int64],
     t: Array,
     theta: Array,
     w: Array,
+    recorded: Array,
     follows: NDArray[np.bool_],
     h_max: float,
+    between: str = "straight",
 ) -> Array:
-    """Position and speed of the load behind a gear, shape (n, 2), at the end of each recorded motion of the motor.
+    """Position and speed of what is beyond a gear, shape (n, 2), at the end of each recorded motion.
 
     Parameters
     ----------
     offsets : array, shape (n + 1,)
-        Motion j is samples ``offsets[j]:offsets[j + 1]`` of `t`, `theta` and its speed `w`.
+        Motion j is samples ``offsets[j]:offsets[j + 1]`` of `t`, `theta`, its speed `w` and the `recorded` drive.
     follows : array of bool, shape (n,)
-        Whether a motion begins where the one before it ended; else the load begins untwisted, as fast as the motor.
+        Whether a motion begins where the one before it ended; else it begins untwisted, as fast as what is measured.
     """
 
-    def along(of: slice, load: State) -> State:
-        return kernel.load_after(numbers.z, t[of], theta[of], h_max, *load)
+    def along(of: slice, beyond: State) -> State:
+        how = (numbers.z, MODES[drive], BETWEEN[between])
+        return kernel.beyond_after(*how, t[of], theta[of], recorded[of], h_max, *beyond)
 
     return _after(offsets, follows, lambda first: (theta[first], w[first]), along)
 
@@ -200,7 +204,7 @@ def bristles_after(
     follows: NDArray[np.bool_],
     play: float,
 ) -> Array:
-    """Share of friction that is built up at the end of each recorded motion, shape (n,); see `loads_after`.
+    """Share of friction that is built up at the end of each recorded motion, shape (n,); see `beyond_after`.
 
     `play`: half width of what is noise of the angle and no way. [rad]
     """

@@ -137,11 +137,10 @@ class Axis(Settings):
             raise ValueError("drive: speed-loop needs loop: {K_w: …}")
         if "supply_sag" in self.effects and self.V_dc is None:
             raise ValueError("effect 'supply_sag' needs V_dc, the supply without load")
-        behind = self.effects.get("gear_compliance", {}).get("inertia")
-        if behind is not None and not 0.0 < behind < self.inertia:
-            raise ValueError(
-                f"gear_compliance: the inertia behind the gear, {behind:g}, must be part of {self.inertia:g}"
-            )
+        for name in ("gear_compliance", "drive_compliance"):
+            beyond = self.effects.get(name, {}).get("inertia")
+            if beyond is not None and not 0.0 < beyond < self.inertia:
+                raise ValueError(f"{name}: the inertia beyond the gear, {beyond:g}, must be part of {self.inertia:g}")
         if self.F_s is not None and self.F_s < self.F_d:
             raise ValueError(f"static friction F_s = {self.F_s} must not be below sliding friction F_d = {self.F_d}")
         for name in self.fitted:

@@ -8,6 +8,9 @@ A gear that gives (`gear_compliance`) takes the inertia J_l at the user out of J
 
     (J - J_l) dω_m/dt = … - T      J_l dω_l/dt = T      T = (θ_m - θ_l)/c + d (ω_m - ω_l)
 
+Where the angle is measured behind the gear (`drive_compliance`), what hangs to the spring is the motor,
+and the drive acts there.
+
 Dry friction stays, breaks away, keeps moving and stops, or has a memory (`ema.effects.friction_memory`).
 For a linear axis read position, speed, mass and force; the equations are the same.
 """
@@ -53,9 +56,10 @@ DROP, BELOW, ROUNDNESS = (row(f"inverter_drop.{name}") for name in ("voltage", "
 SKEW = row("clock_skew.rate")
 POSITION_DELAY, SPEED_DELAY = row("position_delay.time"), row("speed_delay.time")
 COGGING = row("cogging.amplitude")
-COMPLIANCE, J_LOAD, ZETA, LOAD_DRAG, LOAD_FRICTION = (
-    row(f"gear_compliance.{name}") for name in ("compliance", "inertia", "damping", "drag", "friction")
-)
+_beyond = ("compliance", "inertia", "damping", "drag", "friction")  # of what is beyond the gear, seen from the sensor
+AT_USER, AT_MOTOR = row("gear_compliance.compliance"), row("drive_compliance.compliance")
+assert [row(f"gear_compliance.{x}") - AT_USER for x in _beyond] == [0, 1, 2, 3, 4]
+assert [row(f"drive_compliance.{x}") - AT_MOTOR for x in _beyond] == [0, 1, 2, 3, 4]
 LOAD_SHARE, LOAD_SQUARE = row("output_load_friction.share"), row("quadratic_output_load_friction.per_torque")
 DEFLECTION, BRISTLE_DAMPING = row("friction_memory.deflection"), row("friction_memory.damping")
 SAG, V_DC = row("supply_sag.resistance"), row("V_dc")
@@ -143,36 +147,51 @@ def lost(z, i):
 
 @njit(inline="always")
 def gear(z, inertia, h):
-    """Stiffness, damping and the load's inertia of a gear that gives; zeros where it is stiff at steps of `h`.
+    """Stiffness, damping, inertia, drag and friction beyond a gear that gives, and whether the drive acts there.
 
-    d = 2 ζ √(J_m J_l / (J_m + J_l) / c)
+    Zeros where it is stiff at steps of `h`.    d = 2 ζ √(J_m J_l / (J_m + J_l) / c)
     """
-    c, J_l = z[COMPLIANCE], z[J_LOAD]
-    J_m = inertia - J_l
-    if c <= 0.0 or J_m < 0.02 * inertia or h * h * inertia > c * J_m * J_l:
-        return 0.0, 0.0, 0.0
-    return 1.0 / c, 2.0 * z[ZETA] * math.sqrt(J_m * J_l / inertia / c), J_l
+    is_driven = z[AT_MOTOR] > 0.0
+    first = AT_MOTOR if is_driven else AT_USER
+    c, J_b = z[first], z[first + 1]
+    J_a = inertia - J_b
+    if c <= 0.0 or J_a < 0.02 * inertia or h * h * inertia > c * J_a * J_b:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, False
+    return 1.0 / c, 2.0 * z[first + 2] * math.sqrt(J_a * J_b / inertia / c), J_b, z[first + 3], z[first + 4], is_driven
+
+
+@njit(inline="always")
+def share_then(between, x):
+    """Which share of the way to the next sample's value a recorded drive has gone, a share `x` of the time later."""
+    return x if between == STRAIGHT else 0.0 if between == HELD else 1.0
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def load_after(z, t, theta, h_max, theta_l, w_l):
-    """Position and speed of the load, given at t[0], at the end of a recorded motion `theta` of the motor."""
+def beyond_after(z, mode, between, t, theta, drive, h_max, theta_b, w_b):
+    """Position and speed beyond a gear, given at t[0], at the end of a recorded motion under a recorded drive."""
     inertia = z[J] * (1.0 + z[INERTIA])
+    gain, R_now = 1.0 / (1.0 + z[GAIN]), max(z[R] * resistance_factor(z, 0, 1, z[DT]), 1e-9)
     for k in range(t.shape[0] - 1):
         span = t[k + 1] - t[k]
         n_steps = max(1, math.ceil(span / h_max - 1e-9))
         h = span / n_steps
-        stiffness, damping, J_l = gear(z, inertia, h)
+        stiffness, damping, J_b, drag, rubbing, is_driven = gear(z, inertia, h)
         w = (theta[k + 1] - theta[k]) / span
         if stiffness == 0.0:
-            theta_l, w_l = theta[k + 1], w
+            theta_b, w_b = theta[k + 1], w
             continue
         for s in range(n_steps):
-            T = stiffness * (theta[k] + (s + 0.5) * h * w - theta_l - 0.5 * h * w_l) + damping * (w - w_l)
-            theta_l += 0.5 * h * w_l
-            w_l = rubbing_speed_after(w_l, T - z[LOAD_DRAG] * w_l, z[LOAD_FRICTION], h / J_l)
-            theta_l += 0.5 * h * w_l
-    return theta_l, w_l
+            x = (s + 0.5) / n_steps
+            T = stiffness * (theta[k] + x * span * w - theta_b - 0.5 * h * w_b) + damping * (w - w_b)
+            if is_driven:
+                u = (drive[k] + share_then(between, x) * (drive[k + 1] - drive[k]) - z[OFFSET]) * gain
+                if mode == VOLTAGE:
+                    u = (u - z[K_E] * emf_factor(z, 0, 1, 0.0, z[DT]) * w_b) / R_now
+                T += u if mode == FORCE else z[K_T] * emf_factor(z, 0, 1, u, z[DT]) * u
+            theta_b += 0.5 * h * w_b
+            w_b = rubbing_speed_after(w_b, T - drag * w_b, rubbing, h / J_b)
+            theta_b += 0.5 * h * w_b
+    return theta_b, w_b
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
@@ -208,7 +227,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
     t, drive : arrays, shape (n_times,)
         Sample times and the recorded drive.
     start : array, shape (5,)
-        Position, speed, by how much the load behind a gear that gives is behind in both, and the share of friction
+        Position, speed, by how much what is beyond a gear that gives is behind in both, and the share of friction
         that is built up.
     slide : float
         ±1 where the axis is known to slide that way throughout: friction never turns round nor holds. 0: the full rule.
@@ -219,20 +238,20 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
     """
     n = t.shape[0]
     theta, w = start[0], start[1]
-    theta_l, w_l = theta - start[2], w - start[3]
+    theta_b, w_b = theta - start[2], w - start[3]
     bristle, deflection = start[4], z[DEFLECTION]
     inertia = z[J] * (1.0 + z[INERTIA])
-    stiffness, damping, J_l = gear(z, inertia, h_max)
-    J_m = inertia - J_l
+    stiffness, damping, J_b, drag, rubbing, is_driven = gear(z, inertia, h_max)
+    J_a = inertia - J_b
     gain = 1.0 / (1.0 + z[GAIN])
     R_now = z[R] * resistance_factor(z, 0, 1, z[DT])
     skew = 1.0 + z[SKEW]
-    i, i_end, asked, slope, dw = 0.0, 0.0, 0.0, 0.0, 0.0
+    i, i_end, asked, slope, dw, dw_b = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if mode == VOLTAGE:
         u = (drive[0] - z[OFFSET]) * gain
-        i = (u - z[K_E] * emf_factor(z, 0, 1, 0.0, z[DT]) * w) / max(R_now, 1e-9)
+        i = (u - z[K_E] * emf_factor(z, 0, 1, 0.0, z[DT]) * (w_b if is_driven else w)) / max(R_now, 1e-9)
     for k in range(n):
-        out[0, k], out[1, k] = theta, w
+        out[0, k], out[1, k], out[3, k] = theta, w, w_b if is_driven else w
         if mode == CURRENT:
             i = (drive[k] - z[OFFSET]) * gain
         elif mode == SPEED_LOOP:
@@ -252,14 +271,13 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
                 since = w + 0.5 * dw - out[1, k] if between == FAST else 0.0
                 i = min(max(asked - z[K_W] * since, -z[I_MAX]), z[I_MAX])
             else:
-                share = x if between == STRAIGHT else 0.0 if between == HELD else 1.0
-                u = (drive[k] + share * (drive[k + 1] - drive[k]) - z[OFFSET]) * gain
+                u = (drive[k] + share_then(between, x) * (drive[k + 1] - drive[k]) - z[OFFSET]) * gain
                 if mode == VOLTAGE:
                     k_e = z[K_E] * emf_factor(z, 0, 1, i, z[DT])
                     L_now = max(z[L] * inductance_factor(z, 0, 1, i), 1e-12)
                     if z[SAG] > 0.0:
                         u = _applied(u, i, z[SAG], z[V_DC])
-                    e = u - k_e * (w + 0.5 * dw) - lost(z, i)
+                    e = u - k_e * (w_b + 0.5 * dw_b if is_driven else w + 0.5 * dw) - lost(z, i)
                     i_next = current_after(i, e, R_now, L_now, h)
                     i, i_end = 0.5 * (i + i_next), i_next
                 else:
@@ -267,24 +285,26 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
             tau_m = i if mode == FORCE else z[K_T] * emf_factor(z, 0, 1, i, z[DT]) * i
             # positions half a step ahead: second order for everything but friction
             theta_mid = theta + 0.5 * h * w
-            tau = tau_m - torques(z, lines, terms, theta_mid, w, i, t_mid)
+            tau = (0.0 if is_driven else tau_m) - torques(z, lines, terms, theta_mid, w, i, t_mid)
             if stiffness > 0.0:
-                T = stiffness * (theta_mid - theta_l - 0.5 * h * w_l) + damping * (w - w_l)
+                T = stiffness * (theta_mid - theta_b - 0.5 * h * w_b) + damping * (w - w_b)
                 tau -= T
-                theta_l += 0.5 * h * w_l
-                w_l = rubbing_speed_after(w_l, T - z[LOAD_DRAG] * w_l, z[LOAD_FRICTION], h / J_l)
-                theta_l += 0.5 * h * w_l
+                pull = (T + tau_m if is_driven else T) - drag * w_b
+                theta_b += 0.5 * h * w_b
+                dw_b = rubbing_speed_after(w_b, pull, rubbing, h / J_b) - w_b
+                w_b += dw_b
+                theta_b += 0.5 * h * w_b
             w_sliding = w if slide == 0.0 else slide * max(w * slide, CREEP)
             F_s, F_d = friction(z, lines, terms, theta_mid, w_sliding, tau, tau_m, i, t_mid)
-            if friction_memory.is_slow(F_d, deflection, J_m, h):
+            if friction_memory.is_slow(F_d, deflection, J_a, h):
                 bristle = friction_memory.built_up(bristle, 0.5 * h * w, deflection)
-                tau -= friction_memory.torque(bristle, w, F_d, deflection, z[BRISTLE_DAMPING], J_m)
-                w_next = w + tau * h / J_m
+                tau -= friction_memory.torque(bristle, w, F_d, deflection, z[BRISTLE_DAMPING], J_a)
+                w_next = w + tau * h / J_a
                 bristle = friction_memory.built_up(bristle, 0.5 * h * w_next, deflection)
             elif slide == 0.0:
-                w_next = speed_after(w, tau, F_s, F_d, h / J_m)
+                w_next = speed_after(w, tau, F_s, F_d, h / J_a)
             else:
-                w_next = w + (tau - F_d * slide) * h / J_m
+                w_next = w + (tau - F_d * slide) * h / J_a
             theta += 0.5 * h * (w + w_next)
             dw = w_next - w
             w = w_next
@@ -307,7 +327,7 @@ def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
         a, b = max(k - 1, 0), min(k + 1, n - 1)
         di = (out[2, b] - out[2, a]) / ((t[b] - t[a]) * skew) if b > a else 0.0
         k_e = z[K_E] * emf_factor(z, 0, 1, i, z[DT])
-        u = R_now * i + z[L] * inductance_factor(z, 0, 1, i) * di + k_e * out[1, k] + lost(z, i)
+        u = R_now * i + z[L] * inductance_factor(z, 0, 1, i) * di + k_e * out[3, k] + lost(z, i)
         out[3, k] = _commanded(u, i, z[SAG], z[V_DC]) if z[SAG] > 0.0 else u
     for k in range(n - 1, -1, -1):  # backwards, since the undelayed values of earlier samples are still needed
         theta = out[0, k]

@@ -145,7 +145,8 @@ def test_the_load_follows_a_recorded_motion_through_the_gear():
     offsets = np.array([0, half, len(t) + 1])
     motion = (np.concatenate([x[part] for part in parts]) for x in (t, theta, slow * np.sin(slow * t)))
     follows = np.array([False, True])
-    theta_l, w_l = axis.loads_after(numbers, offsets, *motion, follows, 1e-4)[-1]
+    idle = np.zeros(offsets[-1])
+    theta_l, w_l = axis.beyond_after(numbers, "current", offsets, *motion, idle, follows, 1e-4)[-1]
     d = 2.0 * 0.2 * np.sqrt(J_M * J_L / (J_M + J_L) / C_GEAR)
     stiff = 1.0 / C_GEAR + 1j * slow * d
     response = stiff / (stiff - J_L * slow**2)
@@ -174,8 +175,8 @@ def test_how_late_a_sensor_is_does_not_depend_on_the_clock_of_the_record(sensor)
 def test_a_load_of_which_nothing_is_known_before_moves_as_its_motor_does():
     numbers = axis.model(FREE, {"gear_compliance": GEAR["gear_compliance"]})
     t = np.arange(0.0, 0.01, 1e-3)
-    steady = (np.array([0, len(t)]), t, 40.0 * t, np.full(len(t), 40.0), np.array([False]), 1e-4)
-    assert axis.loads_after(numbers, *steady)[0] == pytest.approx([40.0 * t[-1], 40.0], rel=1e-6)
+    steady = (np.array([0, len(t)]), t, 40.0 * t, np.full(len(t), 40.0), np.zeros(len(t)), np.array([False]), 1e-4)
+    assert axis.beyond_after(numbers, "current", *steady)[0] == pytest.approx([40.0 * t[-1], 40.0], rel=1e-6)
 
 
 def test_a_supply_that_sags_leaves_less_to_the_motor_and_asks_for_more():
@@ -189,3 +190,41 @@ def test_a_supply_that_sags_leaves_less_to_the_motor_and_asks_for_more():
     assert u * bus / 6.0 == pytest.approx(0.5 * 2.0, rel=1e-9)
     asked = run(held, "voltage", np.full(len(T), u), effects=sag)[2]
     assert asked[-1] == pytest.approx(2.0, rel=1e-3)
+
+
+DRIVEN = {"drive_compliance": {"compliance": C_GEAR, "inertia": J_M, "damping": 0.0}}
+
+
+@pytest.mark.parametrize("drive", ["current", "voltage"])
+def test_a_motor_drives_a_measured_load_through_its_gear(drive):
+    """The load by scipy's matrix exponential of both inertias, from rest under a constant current or voltage."""
+    k_t, k_e, R = 0.05, 0.03, 0.5
+    x = 0.4 if drive == "current" else 3.0
+    plant = FREE.model_copy(update={"L": 1e-9})
+    out = run(plant, drive, np.full(len(T), x), effects=DRIVEN, h=2.5e-5)
+    drag, pull = (0.0, k_t * x) if drive == "current" else (k_t * k_e / R, k_t * x / R)
+    s = 1.0 / C_GEAR
+    A = np.zeros((5, 5))  # angle and speed of the motor, those of the load, 1
+    A[0, 1] = A[2, 3] = 1.0
+    A[1, [0, 1, 2, 4]] = np.array([-s, -drag, s, pull]) / J_M
+    A[3, [0, 2]] = np.array([s, -s]) / J_L
+    exact = np.array([expm(A * t) @ [0.0, 0.0, 0.0, 0.0, 1.0] for t in T])
+    np.testing.assert_allclose(out[0], exact[:, 2], atol=1e-3 * np.ptp(exact[:, 2]))
+    np.testing.assert_allclose(out[1], exact[:, 3], atol=5e-3 * np.ptp(exact[:, 3]))
+    if drive == "current":
+        np.testing.assert_allclose(out[3], R * x + k_e * exact[:, 1], atol=5e-3 * np.ptp(out[3]))
+
+
+def test_the_motor_before_a_measured_load_is_where_its_drive_has_brought_it():
+    """The load moves as a free pair of both inertias would under a sine of torque: so does the motor that is found."""
+    f, pull = 30.0, 2e-3
+    t = np.arange(0.0, 3.0, 1e-4)
+    s, d = 1.0 / C_GEAR, 2.0 * 0.2 * np.sqrt(J_M * J_L / (J_M + J_L) / C_GEAR)
+    stiff = s + 1j * f * d
+    motor, load = np.linalg.solve([[stiff - J_M * f**2, -stiff], [-stiff, stiff - J_L * f**2]], [pull, 0.0])
+    swing = np.exp(1j * f * t)
+    numbers = axis.model(FREE, {"drive_compliance": {**DRIVEN["drive_compliance"], "damping": 0.2}})
+    motion = ((load * swing).imag, (1j * f * load * swing).imag, (pull * swing).imag / 0.05)
+    theta, w = axis.beyond_after(numbers, "current", np.array([0, len(t)]), t, *motion, np.array([False]), 1e-4)[0]
+    assert theta == pytest.approx((motor * swing[-1]).imag, abs=0.02 * abs(motor))
+    assert w == pytest.approx((1j * f * motor * swing[-1]).imag, abs=0.02 * f * abs(motor))

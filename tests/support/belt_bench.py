@@ -24,7 +24,7 @@ def _run(reference, stiffness, damping, behind, out):
         e = reference[k] - w
         i = min(max(0.03 * e + 0.35 * asked, -6.0), 6.0)
         asked += e / RATE
-        out[0, k], out[1, k], out[2, k] = theta, w, i
+        out[0, k], out[1, k], out[2, k], out[3, k], out[4, k] = theta, w, i, theta_l, w_l
         for _ in range(STEPS):
             T = stiffness * (theta - theta_l) + damping * (w - w_l)
             rubs = (F_M + F_L - behind) * np.tanh(w / 0.05)
@@ -34,16 +34,23 @@ def _run(reference, stiffness, damping, behind, out):
             theta_l += h * w_l
 
 
-def record(behind: float = F_L, seconds: float = 6.0) -> Record:
-    """Moves with rests between them; `behind` is the dry friction at the pulley, the rest is at the motor. [N m]"""
-    rng = np.random.default_rng(11)
+def record(
+    behind: float = F_L, seconds: float = 6.0, *, at_load: bool = False, frequency: float = FREQUENCY, seed: int = 11
+) -> Record:
+    """Moves with rests between them; `behind` is the dry friction at the pulley, the rest is at the motor. [N m]
+
+    `at_load`: recorded are angle and speed of the pulley; `frequency`: of the resonance. [Hz]
+    """
+    rng = np.random.default_rng(seed)
     t = np.arange(round(seconds * RATE)) / RATE
     reference = np.zeros(len(t))
     for begin, end, speed in MOVES:
         reference[(t >= begin) & (t < end)] = speed
-    out = np.empty((3, len(t)))
-    damping = 2.0 * DAMPING * np.sqrt(STIFFNESS * J_M * J_L / (J_M + J_L))
-    _run(lfilter([0.03], [1.0, -0.97], reference), STIFFNESS, damping, behind, out)
-    true = dict(zip(("theta_m", "w_m", "i_q"), out, strict=True))
+    out = np.empty((5, len(t)))
+    stiffness = STIFFNESS * (frequency / FREQUENCY) ** 2
+    damping = 2.0 * DAMPING * np.sqrt(stiffness * J_M * J_L / (J_M + J_L))
+    _run(lfilter([0.03], [1.0, -0.97], reference), stiffness, damping, behind, out)
+    theta, w = out[3:] if at_load else out[:2]
+    true = {"theta_m": theta, "w_m": w, "i_q": out[2]}
     noisy = {name: x + NOISE[name] * rng.standard_normal(len(t)) for name, x in true.items()}
     return Record((Cycle(0, {"t": t, **noisy}),))

@@ -15,8 +15,8 @@ from ema.models.axis_layout import row
 from .whitening import Filter, join
 from .windows import Bench, Window
 
-History = tuple[NDArray[np.int64], Array, Array, Array, NDArray[np.bool_]]
-MEMORY = 1.0  # [s] for which a load behind a gear is followed before a window
+History = tuple[NDArray[np.int64], Array, Array, Array, Array, NDArray[np.bool_]]
+MEMORY = 1.0  # [s] for which what is beyond a gear is followed before a window
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Pack:
     def history(self, late: float = 0.0, n: int = 0) -> History:
         """Motion up to `n` samples before each window, since that of the one before, of a position recorded `late`. [s]
 
-        Offsets, time, position, speed, and whether it follows.
+        Offsets, time, position, speed, drive, and whether it follows.
         """
         if (late, n) not in self._histories:
             self._histories = {(late, n): self._history(late, n)}
@@ -100,11 +100,12 @@ class Pack:
             follows.append(number == w.part.number and first <= last <= end)
             at = np.array([last if follows[-1] else first, end])
             at = np.unique(np.concatenate((at, t[(t > at[0]) & (t < end)])))
-            parts.append((at, np.interp(at, t, theta), np.interp(at, t, speed)))
+            drive = np.interp(at - late, t, w.part.drive)
+            parts.append((at, np.interp(at, t, theta), np.interp(at, t, speed), drive))
             number, last = w.part.number, end
         offsets = np.concatenate(([0], np.cumsum([len(t) for t, *_ in parts]))).astype(np.int64)
-        t, theta, speed = (np.concatenate(column) for column in zip(*parts, strict=True))
-        return offsets, t, theta, speed, np.array(follows)
+        t, theta, speed, drive = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return offsets, t, theta, speed, drive, np.array(follows)
 
     def split(self, rows: Array) -> dict[int, Array]:
         """Columns of `rows` by block."""

@@ -293,7 +293,9 @@ class AxisPlant:
             starts[place, 0] = theta[0] if late_theta == 0.0 else np.interp(t[0] + late_theta, t, theta)
             starts[place, 1] = speed[0] if late_w == 0.0 else np.interp(t[0] + late_w, t, speed)
         if axis.is_flexible(model):
-            starts[:, 2:] = starts[:, :2] - axis.loads_after(model, *pack.history(late_theta, n), step)
+            history = pack.history(late_theta, n)
+            beyond = axis.beyond_after(model, pack.bench.roles.kind, *history, step, self.between)
+            starts[:, 2:] = starts[:, :2] - beyond
         starts[:, :2] = axis.true_state(model, starts[:, :2], derived=pack.bench.roles.speed is None)
         return starts
 
@@ -302,7 +304,8 @@ class AxisPlant:
         if not axis.has_memory(model):
             return None
         play = NOISE * position_noise(pack.bench, pack.windows[0])
-        return axis.bristles_after(model, *pack.history(_late(model)[0], n), play)
+        offsets, t, theta, w, _, follows = pack.history(_late(model)[0], n)
+        return axis.bristles_after(model, offsets, t, theta, w, follows, play)
 
     def main_row(self, block: int) -> int:
         """Row of the output that is shown and whose error is reported."""

@@ -65,10 +65,27 @@ def test_dry_friction_is_told_on_its_side_of_the_gear(support, behind):
     assert value["F_d"] + value["friction"] == pytest.approx(file["F_d"], rel=0.05)
 
 
+@pytest.mark.parametrize("behind", [0.016, 0.0])
+def test_a_motor_that_drives_a_measured_load_through_a_spring(support, behind):
+    """What hangs to the spring is the motor then; its dry friction is told from the load's as well."""
+    belt = support("belt_bench")
+    file = {"J": belt.J_M + belt.J_L, "F_d": belt.F_M + belt.F_L, "C": belt.C, "k_t": belt.K_T, "measured_at": "load"}
+    plant = AxisPlant(RotaryAxis.model_validate(file), [belt.record(behind, at_load=True)], n_threads=1)
+    plant.between = "held"
+    every, at = on_paper.everywhere(plant), {"F_d": file["F_d"]}
+    found = gear_candidate(plant, at, every)
+    fitted = fit(plant, [*plant.base, *found.free], {**at, **found.starts[0]}, every, max_iterations=30)
+    value = {name.removeprefix("drive_compliance."): x for name, x in fitted.point.items()}
+    assert value["compliance"] == pytest.approx(1.0 / belt.STIFFNESS, rel=0.1)
+    assert value["inertia"] == pytest.approx(belt.J_M, rel=0.1)
+    assert value["F_d"] == pytest.approx(behind, abs=0.15 * belt.F_L)
+    assert value["F_d"] + value["friction"] == pytest.approx(file["F_d"], rel=0.05)
+
+
 def test_where_it_may_not_be_it_is_not_looked_for(resonating):
     every = on_paper.everywhere(resonating)
     assert gear_candidate(resonating, AT | {"gear_compliance.compliance": 1.0}, every) is None
-    at_rest = SimpleNamespace(windows=[SimpleNamespace(static=True)])
+    at_rest = SimpleNamespace(windows=[SimpleNamespace(static=True)], plant=resonating.plant)
     assert gear_candidate(at_rest, AT, [0]) is None
     by_itself = RotaryAxis.model_validate(
         {"drive": "speed-loop", "J": 1e-4, "F_d": 0.01, "k_t": 0.05, "loop": {"K_w": 1.0}}
