@@ -91,9 +91,10 @@ def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseM
     if kind == "speed-loop":
         damping = gain / J
     process = gain / J * drive_noise
-    at_rest = np.abs(w.speed) < 3.0 * START_NOISE * speed_noise(b.roles, b.noise, w.period)
+    speed = w.part.speed[w.first : w.first + w.n]  # smoothed no wider than it bends: a stop is at its own sample
+    at_rest = np.abs(speed) < 3.0 * START_NOISE * speed_noise(b.roles, b.noise, w.period)
     process = np.where(at_rest & np.roll(at_rest, 1) & np.roll(at_rest, -1), 0.0, process)
-    turns = np.diff(np.where(at_rest, 0.0, np.sign(w.speed)), prepend=np.sign(w.speed[0])) != 0.0
+    turns = np.diff(np.where(at_rest, 0.0, np.sign(speed)), prepend=np.sign(speed[0])) != 0.0
     stops = maximum_filter1d(np.abs(acceleration), 2 * HALF + 1)  # at rest there is none: how it came there, or left
     late = START_NOISE * speed_noise(b.roles, b.noise, w.period) / np.maximum(stops, 1e-300)
     share = np.minimum(late / w.period, 1.0)  # of a sample
