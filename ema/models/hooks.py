@@ -19,55 +19,23 @@ from .layout import row
 _inline = njit(forceinline=True, fastmath=jit.FAST, error_model="numpy")
 
 
-def _bind(law: Callable[..., float], first: int, n: int) -> Any:
-    """Fix where a law finds its `n` parameters: rows `first`... of the batch array."""
-    f = _inline(law)
-
-    @_inline
-    def bound(z, l, N, *x):
-        return f(*x)
-
-    for place in reversed(range(first, first + n)):
-        bound = _given(bound, place)
-    return bound
-
-
-def _given(law: Any, place: int) -> Any:
-    """A law that finds its next parameter in this row."""
-
-    @_inline
-    def bound(z, l, N, *x):
-        return law(z, l, N, *x, z[place * N + l])
-
-    return bound
-
-
-def _combine(how: str, head: Any, tail: Any) -> Any:
-    @_inline
-    def total(z, l, N, *x):
-        return head(z, l, N, *x) + tail(z, l, N, *x)
-
-    @_inline
-    def product(z, l, N, *x):
-        return head(z, l, N, *x) * tail(z, l, N, *x)
-
-    return total if how == "sum" else product
-
-
 def combined(hook: str, plant: str = "ema", row: Callable[[str], int] = row) -> Any:
-    """The laws of all effects of `plant` at `hook` as one jitted function; neutral where there is none."""
-    how, _ = HOOKS[hook]
-    neutral = 0.0 if how == "sum" else 1.0
+    """The laws of all effects of `plant` at `hook` as one jitted function; neutral where there is none.
 
-    @_inline
-    def function(z, l, N, *x):
-        return neutral
-
+    It is written out as one expression: a function around each law and each of its parameters takes longer to compile
+    than the equations themselves.
+    """
+    how, n_arguments = HOOKS[hook]
+    x = ", ".join(f"x{j}" for j in range(n_arguments))
+    sign, total = ("+", "0.0") if how == "sum" else ("*", "1.0")
+    laws: dict[str, Any] = {}
     for name, effect in registry().items():
         if hook in effect.laws and plant in effect.plants:
-            first = row(f"{name}.{effect.parameters[0].name}")
-            function = _combine(how, _bind(effect.laws[hook], first, len(effect.parameters)), function)
-    return function
+            laws[name] = _inline(effect.laws[hook])
+            values = ", ".join(f"z[{row(f'{name}.{p.name}')} * N + l]" for p in effect.parameters)
+            total = f"{name}({x}, {values}) {sign} ({total})"
+    exec(f"def {hook}(z, l, N, {x}):\n    return {total}", laws)
+    return _inline(laws[hook])
 
 
 shaft_torque = combined("shaft_torque")
