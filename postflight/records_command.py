@@ -100,7 +100,8 @@ def map_columns(file: Path, write: bool) -> None:
     if write:
         require_new(beside, SEE_IT)
     seen = {one.channel for one in proposals}
-    if "t" not in seen and seen & {"theta_m", "q"} and seen & {"i_q", "torque", "force"}:
+    moves = bool(seen & {"w_m", "v", "w_ref", "theta_ref", "q_ref"})  # what is held at rest has no speed and no command
+    if "t" not in seen and seen & {"theta_m", "q"} and seen & {"i_q", "torque", "force"} and not moves:
         side = side.model_copy(update={"at_rest": True})  # what holds the axis, over its place
     text = as_sidecar(file.name, proposals, side)
     if "t" not in seen and not side.at_rest:

@@ -154,6 +154,12 @@ def test_without_a_time_the_answer_is_no(tmp_path):
         mapped(tmp_path, "position [rad],winding (°C)")
 
 
+def test_what_has_a_speed_is_no_reading_at_rest(tmp_path):
+    """A winch's log counted ticks: as a map at rest its speed was told to be constant at 0."""
+    with pytest.raises(NegativeAnswer, match="a counter: {channel: t"):
+        mapped(tmp_path, "tick,drum_enc_rev,drum_speed_rpm,torque_kNm")
+
+
 def test_a_file_without_a_known_time_names_the_command(tmp_path):
     path, _ = mapped(tmp_path, "Time [ms],Position [mm],Force [N]")
     with pytest.raises(RecordError, match=f"'ema records map {path}' proposes"):
