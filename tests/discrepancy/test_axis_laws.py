@@ -204,8 +204,3 @@ def test_free_runs_find_the_friction_that_a_share_per_kelvin_is_of(geared):
     k, C_20 = (found.point[f"viscous_by_temperature.{name}"] for name in ("per_kelvin", "coefficient"))
     lost = C * (1.0 - np.exp(activation * (1.0 / 329.15 - 1.0 / 293.15)))
     assert C_20 * (1.0 - np.exp(-36.0 * k)) == pytest.approx(lost, rel=0.1)  # the hidden law is Arrhenius'
-
-
-def test_a_law_whose_only_parameter_is_a_coefficient_can_begin_where_the_balance_has_it():
-    law = begin_at("quadratic_drag", {"coefficient": 1e-6}, {})
-    assert [f.name for f in law.free] == ["quadratic_drag.coefficient"]
