@@ -1,6 +1,7 @@
 """Benches with a position loop: a positioning table, and a servo with a pendulum. Shares no code with the models.
 
-Fine steps of a semi-implicit Euler rule; dry friction by its smallest force that stops the axis within a step. The
+Fine steps of Euler's rule, positions by the mean speed of a step: by the speed at its end they would run ahead by half a
+step, which records of low noise show. Dry friction is the smallest force that stops the axis within a step. The
 controllers act on what an encoder counts, and hold what they ask for until the next sample.
 """
 
@@ -46,8 +47,9 @@ def _table(reference, hz, M, F_d, Cp, Cn, constant, quadratic, spring, stribeck,
             drag = (Cp if v > 0 else Cn) * v + quadratic * v * abs(v) + constant + spring * q
             free = v + dt / M * (force - drag)
             stop = dt / M * (F_d + stribeck * np.exp(-abs(v) / 0.02))
+            before = v
             v = 0.0 if abs(free) <= stop else free - np.sign(free) * stop
-            q += dt * v
+            q += 0.5 * dt * (before + v)
 
 
 def table(bench: Table, seed: int, *, seconds: float = 16.0) -> Record:
@@ -120,8 +122,9 @@ def _servo(reference, on, hz, J, gravity, F_d, C, by_load, constant, k_t, k_e, R
             passed = abs(load + constant)
             free = w + dt / J * (motor - load - C * w - constant)
             stop = dt / J * (F_d + by_load * passed)
+            before = w
             w = 0.0 if abs(free) <= stop else free - np.sign(free) * stop
-            theta += dt * w
+            theta += 0.5 * dt * (before + w)
 
 
 def servo(bench: Servo, seed: int, *, seconds: float = 16.0, off: tuple[float, float] | None = None) -> Record:
