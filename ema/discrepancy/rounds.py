@@ -20,6 +20,7 @@ from .selection import (
     fit_model,
     fit_with_each,
     is_worth_it,
+    may_be_worth_it,
 )
 from .verdict import Verdict, judge
 
@@ -81,6 +82,8 @@ def judge_model(plant: Plant, model: Tried) -> Verdict:
 def select(plant: Plant, state: State, progress: Progress) -> None:
     """Forward selection until the residual is noise, nothing helps, or enough kinds are in the model.
 
+    Of several effects that are there, the first may gain no more than chance while the others are missing. It is taken
+    all the same: `revise` asks each what it is worth beside the others.
     Dry friction has side minima: where the model does as well without an effect, begun where the fit with it ended, the
     gain was not the effect's own.
     """
@@ -88,7 +91,7 @@ def select(plant: Plant, state: State, progress: Progress) -> None:
     while not judge_model(plant, state.model).is_noise:
         trials = _round(plant, state, state.model, progress)
         best = choose(trials, state.model) if trials else None
-        if best is None or not is_worth_it(trials[best], state.model):
+        if best is None or not may_be_worth_it(trials[best], state.model):
             return
         if state.reread(state.model, trials[best]):
             state.plain = state.model = fit_base(plant)
@@ -108,7 +111,7 @@ def select(plant: Plant, state: State, progress: Progress) -> None:
             return
         n = len(state.model.accepted)
         again = leave_out(plant, trials[best], {n})
-        if compare(again, state.model).gain > 0.0 and not is_worth_it(trials[best], again):
+        if compare(again, state.model).gain > 0.0 and not may_be_worth_it(trials[best], again):
             if n == begun_anew_with:
                 return
             begun_anew_with = n
@@ -187,35 +190,46 @@ def _round(
 
 def revise(plant: Plant, state: State, progress: Progress) -> None:
     """Look again at each effect beside the later ones: drop what they made superfluous, replace what they unmasked."""
+    drop_unneeded(plant, state, progress)
     k = 0
     while len(state.model.accepted) > 1 and k < len(state.model.accepted):
         own = state.model.accepted[k]
-        progress(f"without {own.key}")
-        reduced = leave_out(plant, state.model, {k})
-        if not is_worth_it(state.model, reduced):
-            state.model = reduced
-            del state.rounds[k]
-            continue
-        trials = state.rounds[k][0]
+        trials, reduced = state.rounds[k]
         is_current = own.key in trials and trials[own.key] is state.model
-        if own.is_structure or is_current:
-            state.rounds[k] = (state.rounds[k][0], reduced)
-            k += 1
-            continue
-        many = bool(trials) and len(reduced.fits[0].free) > MANY
-        rivals = _strongest(state.rounds[k][0], state.rounds[k][1]) if many else None
-        trials = _round(plant, state, reduced, progress, rivals)
-        trials[own.key] = state.model
-        best = choose(trials, reduced) or own.key
-        if best != own.key and compare(trials[best], state.model).is_clear:
-            model = trials[best]
-            del state.rounds[k]
-            state.rounds.append((trials, reduced))
-            state.model = model  # the new one stands last
-            k += 1
-            continue
+        if not own.is_structure and not is_current:
+            many = bool(trials) and len(reduced.fits[0].free) > MANY
+            rivals = _strongest(trials, reduced) if many else None
+            trials = _round(plant, state, reduced, progress, rivals)
+            trials[own.key] = state.model
+            best = choose(trials, reduced) or own.key
+            if best != own.key and compare(trials[best], state.model).is_clear:
+                del state.rounds[k]
+                state.rounds.append((trials, reduced))
+                state.model = trials[best]  # the new one stands last
+                drop_unneeded(plant, state, progress)
+                continue
         state.rounds[k] = (trials, reduced)
         k += 1
+
+
+def drop_unneeded(plant: Plant, state: State, progress: Progress) -> None:
+    """Leave out, the weakest first, what is not worth it beside the others; note what each that stays is worth."""
+    while n := len(state.model.accepted):
+        without = [state.plain]
+        if n > 1:
+            progress(f"without each of {n}")
+            without = [leave_out(plant, state.model, {k}) for k in range(n)]
+        gains = {
+            k: compare(state.model, reduced).gain
+            for k, reduced in enumerate(without)
+            if not is_worth_it(state.model, reduced)
+        }
+        if not gains:
+            state.rounds = [(trials, reduced) for (trials, _), reduced in zip(state.rounds, without, strict=True)]
+            return
+        weakest = min(gains, key=lambda k: gains[k])
+        state.model = without[weakest]
+        del state.rounds[weakest]
 
 
 def leave_out(plant: Plant, model: Tried, out: set[int]) -> Tried:

@@ -219,6 +219,17 @@ def above_noise(tried: Tried) -> float:
 
 def is_worth_it(new: Tried, old: Tried) -> bool:
     """A further effect must be significant and explain a share of what is not noise; a nameless term a larger one."""
+    return compare(new, old).is_significant and _is_a_share(new, old)
+
+
+def may_be_worth_it(new: Tried, old: Tried) -> bool:
+    """What an effect gains is a share of what is not noise, if perhaps by chance; a nameless term must be worth it."""
+    if new.accepted[-1].is_structure:
+        return is_worth_it(new, old)
+    return compare(new, old).gain > ODDS and _is_a_share(new, old)
+
+
+def _is_a_share(new: Tried, old: Tried) -> bool:
     share = (above_noise(old) - above_noise(new)) / max(above_noise(old), 1e-12)
     nameless = len(new.accepted) > len(old.accepted) and new.accepted[-1].is_structure
-    return compare(new, old).is_significant and share > (MIN_SHARE_OF_TERM if nameless else MIN_SHARE)
+    return share > (MIN_SHARE_OF_TERM if nameless else MIN_SHARE)

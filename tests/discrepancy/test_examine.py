@@ -215,3 +215,23 @@ def test_what_is_seen_together_and_is_not_there_is_not_named(seed):
     assert {e["name"] for e in examine(toy, together=toy.seen_together).effects} == {"a"}
     nothing = Opposed(seed)
     assert examine(nothing, together=nothing.seen_together).verdict == "adequate"
+
+
+class Uneven(Toy):
+    """A few vigorous parts show what `a`, `b` and `c` do, and show each of them beside the other two only."""
+
+    def __init__(self, seed: int, **hidden: float):
+        super().__init__(seed, ("a", "b", "c"))
+        rng = np.random.default_rng(seed)
+        vigour = np.exp(1.5 * rng.standard_normal((N_BLOCKS, 1, 1)))
+        self.columns |= {name: vigour * self.columns[name] for name in self.effects}
+        self.columns["k"], noise = rng.standard_normal((2, N_BLOCKS, 1, N))
+        self.y = QUIET * noise + sum(size * self.columns[name] for name, size in hidden.items())
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_of_three_effects_the_first_may_gain_no_more_than_chance_by_itself(seed):
+    toy = Uneven(seed, a=2.0, b=2.0, c=2.0)
+    found = examine(toy)
+    assert {e["name"] for e in found.effects} == {"a", "b", "c"}
+    assert found.verdict in ("explained", "partly explained")

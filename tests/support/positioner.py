@@ -1,7 +1,7 @@
 """Benches with a position loop: a positioning table, and a servo with a pendulum. Shares no code with the models.
 
-Fine steps of Euler's rule, positions by the mean speed of a step: by the speed at its end they would run ahead by half a
-step, which records of low noise show. Dry friction is the smallest force that stops the axis within a step. The
+Fine steps of Euler's rule, positions by the mean speed of a step: by the speed at its end they would run half a step
+ahead, which records of low noise show. Dry friction is the smallest force that stops the axis within a step. The
 controllers act on what an encoder counts, and hold what they ask for until the next sample.
 """
 

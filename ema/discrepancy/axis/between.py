@@ -10,6 +10,7 @@ lighter by half a sample in the loop's time constant; where the record does not 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -57,7 +58,7 @@ def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     if there != here:
         progress(f"again, with a drive that is {there} between samples")
         plant.between = there
-        other = examine(plant, progress, reread, plant.seen_together)
+        other = examine(plant, progress, reread.but(here), plant.seen_together)
         there = plant.between
         alike = plant.plant.drive == "speed-loop" and _alike(other, outcome)
         if _is_simpler(other, outcome):
@@ -89,8 +90,12 @@ class Rereading:
     speed loop is left as it is (`_doubted`): acting faster is as good as any inertia.
     """
 
-    def __init__(self, plant: AxisPlant, progress: Progress) -> None:
-        self._plant, self._progress, self._turns = plant, progress, len(LATE)
+    def __init__(self, plant: AxisPlant, progress: Progress, ways: Sequence[str] = tuple(LATE)) -> None:
+        self._plant, self._progress, self._ways, self._turns = plant, progress, ways, len(LATE)
+
+    def but(self, way: str) -> Rereading:
+        """The same without a way with which all was examined already."""
+        return Rereading(self._plant, self._progress, [w for w in self._ways if w != way])
 
     def __call__(self, model: Tried, further: Tried) -> bool:
         """Whether the plant's records are taken another way from now on, for `model` and instead of `further`."""
@@ -98,11 +103,13 @@ class Rereading:
         if plant.plant.drive == "speed-loop" or self._turns == 0:
             return False
         tried = {}
-        for way in [way for way in LATE if way != here]:
+        for way in [way for way in self._ways if way != here]:
             plant.between = way
             self._progress(f"a drive that is {way} between samples")
             tried[way] = refit(plant, model)
         plant.between = here
+        if not tried:
+            return False
         best = max(tried, key=lambda way: compare(tried[way], model).gain)
         if compare(tried[best], model).gain < ODDS or not _is_no_worse(tried[best], further):
             return False
