@@ -230,8 +230,9 @@ def _wins(name: str, model: Regression, rivals: Mapping[str, Regression]) -> dic
     rng = np.random.default_rng(0)
     drawn = rng.multinomial(losses.shape[1], np.full(losses.shape[1], 1.0 / losses.shape[1]), N_DRAWS)
     left = losses @ drawn.T
-    winners = np.argmax(left <= (1.0 + EQUAL) * left.min(axis=0), axis=0)
-    return {own: float(np.mean(winners == k)) for k, own in enumerate([name, *rivals])}
+    first = left <= (1.0 + EQUAL) * left.min(axis=0)
+    shares = (first / first.sum(axis=0)).mean(axis=1)  # equals share a draw
+    return dict(zip([name, *rivals], shares.tolist(), strict=True))
 
 
 def _is_ruled_out(found: Rows, plain: Plain, model: Regression, law: Law, rival: Regression) -> bool:
