@@ -79,9 +79,9 @@ class Weighed:
 def weigh_sets(plain: Tried, model: Tried, rounds: Sequence[tuple[dict[str, Tried], Tried]]) -> Weighed:
     """Every set of effects of the library that was fitted, beside the terms without a name that the model has.
 
-    Where the likeliest leaves more than noise, the form of its law is another, and so may be that of the others: each
-    may be off by a share of what there was to explain. `rounds` hold, for each effect of `model`, the trials in its
-    place and the model without it.
+    Where the likeliest leaves more than noise, the form of its laws is another, and so may be that of the others: each
+    may be off by a share of what it explains. `rounds` hold, for each effect of `model`, the trials in its place and
+    the model without it.
     """
     fitted = [plain]
     for trials, before in rounds:
@@ -91,15 +91,27 @@ def weigh_sets(plain: Tried, model: Tried, rounds: Sequence[tuple[dict[str, Trie
     scale = min(t.scale for t in sets.values())
     parts = {names: log_scores(t, scale) for names, t in sets.items()}
     score = {names: float(of.sum()) for names, of in parts.items()}
-    gained = max(score.values()) - score[_names(plain)]
-    form = 0.5 * SAME_SHARE * gained if scale > NEARLY_NOISE else 0.0
+    form = _misfits_of_form(score) if scale > NEARLY_NOISE else {}
     evidence = {names: z + log_odds(PRIOR) * len(names) for names, z in score.items()}
     in_place = {
         own.key: {key: t for key, t in trials.items() if not is_nameless(key, t)}
         for own, (trials, _) in zip(model.accepted, rounds, strict=True)
     }
     effects = {c.key: c.effect for t in sets.values() for c in t.accepted if not c.is_structure}
-    return Weighed(posterior(evidence, form, parts), sets, in_place, effects)
+    return Weighed(posterior(evidence, parts=parts, form=form), sets, in_place, effects)
+
+
+def _misfits_of_form(score: Mapping[tuple[str, ...], float]) -> dict[str, float]:
+    """What each cause's law may be off by: a share of what it adds to the likeliest set that has it. [nats]
+
+    `score` of each set, without its prior. What a cause adds is held against the likeliest set that holds less.
+    """
+    form = {}
+    for cause in sorted({c for names in score for c in names}):
+        likeliest = max((names for names in score if cause in names), key=lambda names: score[names])
+        less = [x for names, x in score.items() if set(names) < set(likeliest) and cause not in names]
+        form[cause] = 0.5 * SAME_SHARE * max(score[likeliest] - max(less), 0.0)
+    return form
 
 
 def _names(tried: Tried) -> tuple[str, ...]:

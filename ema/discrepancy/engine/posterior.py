@@ -41,14 +41,18 @@ def log_odds(p: float) -> float:
 
 
 def posterior(
-    log_evidence: Mapping[tuple[str, ...], float], error: float, parts: Mapping[tuple[str, ...], Array] | None = None
+    log_evidence: Mapping[tuple[str, ...], float],
+    error: float = 0.0,
+    parts: Mapping[tuple[str, ...], Array] | None = None,
+    form: Mapping[str, float] | None = None,
 ) -> list[Entry]:
     """Sets by their probability, the likeliest first.
 
     What the evidence may be off by is drawn for every set and summed over, so that two sets that differ by less than
-    that stay near even. So is the record, where it is known what each of its parts adds: parts count as often as a
-    Bayesian bootstrap says (Rubin, Ann. Stat. 9, 1981; for predictive scores Yao et al., Bayesian Anal. 13, 2018), so
-    that a set that leads in a few parts and lags in others is no surer than that.
+    that stay near even. What the form of a cause's law takes from it is drawn once for all sets that have the cause:
+    what two sets share does not part them. The record is drawn too, where it is known what each of its parts adds:
+    parts count as often as a Bayesian bootstrap says (Rubin, Ann. Stat. 9, 1981; for predictive scores Yao et al.,
+    Bayesian Anal. 13, 2018), so that a set that leads in a few parts and lags in others is no surer than that.
 
     Parameters
     ----------
@@ -56,6 +60,8 @@ def posterior(
         Of each set, with its prior. [nats]
     error : float
         Standard deviation of each. [nats]
+    form : mapping
+        The same of what a cause's law, of another form than the record's, takes from every set that has it. [nats]
     parts : mapping to arrays, shape (n_parts,)
         What each part of the record adds to a set's evidence. [nats]
     """
@@ -64,6 +70,11 @@ def posterior(
     rng = np.random.default_rng(SEED)
     off = error * rng.standard_normal((DRAWS, len(z))) if error > 0.0 else np.zeros((1, len(z)))
     own = np.full(len(z), error)
+    if form:
+        has = np.array([[cause in name for name in names] for cause in form], dtype=float)
+        taken = (rng.standard_normal((DRAWS, len(form))) * list(form.values())) @ has
+        off = off + taken
+        own = np.hypot(own, (taken - taken[:, [np.argmax(z)]]).std(axis=0))
     if parts is not None:
         of_parts = np.array([parts[name] for name in names])
         often = rng.dirichlet(np.ones(of_parts.shape[1]), DRAWS) * of_parts.shape[1]
