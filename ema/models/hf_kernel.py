@@ -20,7 +20,8 @@ from ema.effects.vector_math import TWO_PI, cos, sin
 
 from . import hooks, jit
 from .layout import row
-from .parts import FRICTION, GEAR, INVERTER, MOTOR, SENSORS, TABLES, TORQUE
+from .parts import FRICTION, GEAR, INVERTER, LOCATED, MOTOR, SENSORS, TABLES, TORQUE
+from .switching import currents_after, slopes
 
 I_A, I_B, I_C, S_A, S_B, S_C = (row(f"{x}_{j}") for x in "is" for j in PHASES)
 OFF_A, OFF_B, OFF_C = (row(f"off_{j}") for j in PHASES)
@@ -94,41 +95,65 @@ def electrical_step(z, l, N, dt, parts, audited):
 
     # hysteresis comparators and leg voltages
     I_ref, h = z[I_REF * N + l], z[H * N + l]
-    s_a = comparator(z[S_A * N + l], I_ref * six_step(n) - x_a, h)
-    s_b = comparator(z[S_B * N + l], I_ref * six_step(n - 2.0) - x_b, h)
-    s_c = comparator(z[S_C * N + l], I_ref * six_step(n + 2.0) - x_c, h)
-    if len(parts) & INVERTER:
-        dead = z[DEAD_TIME * N + l]
-        on = z[DELAY * N + l] + dead  # from a comparator's decision until the leg is on again
-        off_a = on if s_a != z[S_A * N + l] else z[OFF_A * N + l]
-        off_b = on if s_b != z[S_B * N + l] else z[OFF_B * N + l]
-        off_c = on if s_c != z[S_C * N + l] else z[OFF_C * N + l]
-        late_a, late_b, late_c = (
-            share_of_step(off_a - dead, dt),
-            share_of_step(off_b - dead, dt),
-            share_of_step(off_c - dead, dt),
+    e_a, e_b, e_c = I_ref * six_step(n) - x_a, I_ref * six_step(n - 2.0) - x_b, I_ref * six_step(n + 2.0) - x_c
+    if len(parts) & LOCATED:
+        told_a, told_b, told_c = 1.0, 1.0, 1.0
+        if len(parts) & SENSORS:
+            told_a, told_b, told_c = 1.0 + z[GAIN_A * N + l], 1.0 + z[GAIN_B * N + l], 1.0 + z[GAIN_C * N + l]
+        (n_a, n_b, n_c), (s_a, s_b, s_c), work, heat = currents_after(
+            (i_a, i_b, i_c),
+            (e_a, e_b, e_c),
+            (z[S_A * N + l], z[S_B * N + l], z[S_C * N + l]),
+            (told_a, told_b, told_c),
+            (R_a, R_b, R_c),
+            (L_a, L_b, L_c),
+            (k_a * w_m, k_b * w_m, k_c * w_m),
+            0.5 * z[V_DC * N + l],
+            h,
+            dt,
         )
-        u_dc = z[U_DC * N + l]
-        v_a = leg_voltage(s_a, i_a, u_dc, late_a, share_of_step(off_a, dt) - late_a)
-        v_b = leg_voltage(s_b, i_b, u_dc, late_b, share_of_step(off_b, dt) - late_b)
-        v_c = leg_voltage(s_c, i_c, u_dc, late_c, share_of_step(off_c, dt) - late_c)
-        z[OFF_A * N + l] = max(off_a - dt, 0.0)
-        z[OFF_B * N + l] = max(off_b - dt, 0.0)
-        z[OFF_C * N + l] = max(off_c - dt, 0.0)
-        i_dc = 0.5 * (s_a * i_a + s_b * i_b + s_c * i_c)
-        z[U_DC * N + l] = link_voltage(u_dc, z[V_DC * N + l], i_dc, z[SOURCE_R * N + l], z[SOURCE_C * N + l], dt)
     else:
-        u_dc = z[V_DC * N + l]
-        v_a, v_b, v_c = 0.5 * u_dc * s_a, 0.5 * u_dc * s_b, 0.5 * u_dc * s_c
+        s_a = comparator(z[S_A * N + l], e_a, h)
+        s_b = comparator(z[S_B * N + l], e_b, h)
+        s_c = comparator(z[S_C * N + l], e_c, h)
+        if len(parts) & INVERTER:
+            dead = z[DEAD_TIME * N + l]
+            on = z[DELAY * N + l] + dead  # from a comparator's decision until the leg is on again
+            off_a = on if s_a != z[S_A * N + l] else z[OFF_A * N + l]
+            off_b = on if s_b != z[S_B * N + l] else z[OFF_B * N + l]
+            off_c = on if s_c != z[S_C * N + l] else z[OFF_C * N + l]
+            late_a, late_b, late_c = (
+                share_of_step(off_a - dead, dt),
+                share_of_step(off_b - dead, dt),
+                share_of_step(off_c - dead, dt),
+            )
+            u_dc = z[U_DC * N + l]
+            v_a = leg_voltage(s_a, i_a, u_dc, late_a, share_of_step(off_a, dt) - late_a)
+            v_b = leg_voltage(s_b, i_b, u_dc, late_b, share_of_step(off_b, dt) - late_b)
+            v_c = leg_voltage(s_c, i_c, u_dc, late_c, share_of_step(off_c, dt) - late_c)
+            z[OFF_A * N + l] = max(off_a - dt, 0.0)
+            z[OFF_B * N + l] = max(off_b - dt, 0.0)
+            z[OFF_C * N + l] = max(off_c - dt, 0.0)
+            i_dc = 0.5 * (s_a * i_a + s_b * i_b + s_c * i_c)
+            z[U_DC * N + l] = link_voltage(u_dc, z[V_DC * N + l], i_dc, z[SOURCE_R * N + l], z[SOURCE_C * N + l], dt)
+        else:
+            u_dc = z[V_DC * N + l]
+            v_a, v_b, v_c = 0.5 * u_dc * s_a, 0.5 * u_dc * s_b, 0.5 * u_dc * s_c
+        d_a, d_b = slopes(
+            v_a - R_a * i_a - k_a * w_m,
+            v_b - R_b * i_b - k_b * w_m,
+            v_c - R_c * i_c - k_c * w_m,
+            L_a,
+            L_b,
+            L_c,
+            dt / (L_a * L_b + L_b * L_c + L_c * L_a),
+        )
+        n_a, n_b = i_a + d_a, i_b + d_b
+        n_c = -n_a - n_b
+        m_a, m_b, m_c = 0.5 * (i_a + n_a), 0.5 * (i_b + n_b), 0.5 * (i_c + n_c)
+        work = dt * (v_a * m_a + v_b * m_b + v_c * m_c)
+        heat = dt * (R_a * i_a * m_a + R_b * i_b * m_b + R_c * i_c * m_c)
     z[S_A * N + l], z[S_B * N + l], z[S_C * N + l] = s_a, s_b, s_c
-
-    # the floating neutral v_n keeps the sum of the currents at zero; eliminated from L_j di_j/dt = u_j - v_n
-    u_a, u_b, u_c = v_a - R_a * i_a - k_a * w_m, v_b - R_b * i_b - k_b * w_m, v_c - R_c * i_c - k_c * w_m
-    u_ab, u_bc, u_ca = u_a - u_b, u_b - u_c, u_c - u_a
-    dt_LL = dt / (L_a * L_b + L_b * L_c + L_c * L_a)
-    n_a = i_a + (u_ab * L_c - u_ca * L_b) * dt_LL
-    n_b = i_b + (u_bc * L_a - u_ab * L_c) * dt_LL
-    n_c = -n_a - n_b
     z[I_A * N + l], z[I_B * N + l], z[I_C * N + l] = n_a, n_b, n_c
 
     # measured currents through two first-order anti-alias stages
@@ -141,9 +166,8 @@ def electrical_step(z, l, N, dt, parts, audited):
     z[LAG2_C * N + l] += g * (z[LAG1_C * N + l] - z[LAG2_C * N + l])
 
     if len(audited):  # with the currents in the middle of the step, so that ½ L i² is accounted for exactly
-        m_a, m_b, m_c = 0.5 * (i_a + n_a), 0.5 * (i_b + n_b), 0.5 * (i_c + n_c)
-        z[E_ELECTRIC * N + l] += dt * (v_a * m_a + v_b * m_b + v_c * m_c)
-        z[E_COPPER * N + l] += dt * (R_a * i_a * m_a + R_b * i_b * m_b + R_c * i_c * m_c)
+        z[E_ELECTRIC * N + l] += work
+        z[E_COPPER * N + l] += heat
     return k_a * n_a + k_b * n_b + k_c * n_c
 
 

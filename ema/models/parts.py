@@ -12,6 +12,7 @@ from operator import or_
 from ema.effects import registry
 
 MOTOR, INVERTER, SENSORS, TORQUE, FRICTION, GEAR, TABLES = (1 << bit for bit in range(7))
+LOCATED = 1 << 7  # no effect: comparators turn within a step (`ema.models.switching`)
 
 OF_HOOK = {
     "shaft_torque": TORQUE,

@@ -1,0 +1,72 @@
+"""Comparators that turn where a current leaves its band: what is simulated does not hang on the step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema.core.errors import ConfigError
+from ema.models import hf
+
+N_RUNS = 32
+SHORT = 25  # samples of a local mean
+FINE = 2.5e-7  # [s]
+FAULTS = np.array([0.05, 0.02, 0.0, 0.1, 0.05, 0.3])
+
+
+def local_means(plant, *, command=None, **how):
+    """Local means of the phase currents of runs with seeds of their own, shape (N_RUNS, 3, n). [A]"""
+    i = hf.simulate(plant, np.tile(FAULTS, (N_RUNS, 1)), command, seeds=np.arange(N_RUNS), n_threads=2, **how).i
+    return i[..., : i.shape[-1] // SHORT * SHORT].reshape(N_RUNS, 3, -1, SHORT).mean(axis=-1)
+
+
+def common_difference(some, others):
+    """Rms of what the means over all runs differ by, of products of two halves of the runs: chance adds nothing. [A]"""
+    one, other = (some[half::2].mean(axis=0) - others[half::2].mean(axis=0) for half in (0, 1))
+    return np.sqrt(max(float((one * other).mean()), 0.0))
+
+
+@pytest.fixture(scope="module")
+def fine(shipped_plant):
+    return local_means(shipped_plant, located=True, dt=FINE)
+
+
+@pytest.mark.parametrize("dt", [1e-6, 2e-6])
+def test_what_currents_do_on_average_does_not_hang_on_the_step(shipped_plant, fine, dt):
+    assert common_difference(local_means(shipped_plant, located=True, dt=dt), fine) < 2e-3
+
+
+def test_comparators_asked_once_a_step_come_to_the_same_with_fine_steps(shipped_plant, fine):
+    asked = {dt: common_difference(local_means(shipped_plant, dt=dt), fine) for dt in (FINE, 1e-6)}
+    assert asked[1e-6] > 8e-3
+    assert asked[FINE] < 0.6 * asked[1e-6]
+
+
+def test_energy_is_kept_over_every_turn_within_a_step(shipped_plant):
+    r = hf.simulate(shipped_plant, FAULTS, located=True, dt=2e-6, audited=True)
+    E = {name: float(x[0]) for name, x in r.energy.items()}
+    asked = hf.simulate(shipped_plant, FAULTS, audited=True).energy
+    balance = E["E_electric"] - E["E_copper"] - E["E_shaft"]
+    assert abs(balance) < 2e-3 * E["E_electric"]  # and what the inductances hold at the end
+    assert E["E_electric"] == pytest.approx(float(asked["E_electric"][0]), rel=0.02)
+
+
+def test_a_run_is_the_same_wherever_it_stands_in_a_batch(shipped_plant):
+    some, others = (
+        hf.simulate(shipped_plant, np.tile(FAULTS, (len(seeds), 1)), seeds=np.array(seeds), located=True, dt=2e-6).i
+        for seeds in ([0, 1, 2], [1, 5])
+    )
+    assert np.array_equal(some[1], others[0])
+
+
+def test_a_sensor_that_reads_too_much_moves_the_band(shipped_plant):
+    effects = {"current_gain": {f"gain_{phase}": 0.25 for phase in "abc"}}
+    known = hf.simulate(shipped_plant, np.zeros(6), effects=effects, located=True, noise=False)
+    asked = hf.simulate(shipped_plant, np.zeros(6), effects=effects, dt=FINE, noise=False)
+    some, other = (np.abs(r.i).mean() for r in (known, asked))
+    assert some == pytest.approx(other, rel=0.01)
+
+
+def test_legs_that_follow_late_are_refused_in_one_line(shipped_plant):
+    with pytest.raises(ConfigError, match="located"):
+        hf.simulate(shipped_plant, np.zeros(6), located=True, effects={"dead_time": {"time": 1e-6}})
