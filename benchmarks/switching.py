@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from ema.core import config, resources
 from ema.models import hf
-from ema.models.actuator_file import load
+from ema.models.actuator import Actuator
 
 SEEDS, SHORT = 96, 25  # runs; samples of a local mean
 FAULTS = np.array([0.05, 0.02, 0.0, 0.1, 0.05, 0.3])
@@ -25,7 +26,7 @@ TRIED: list[dict[str, Any]] = [
 
 def _local_means(how: dict[str, Any]) -> tuple[np.ndarray, float]:
     """Local means, shape (SEEDS, 3, n) [A], and processor time of a run. [ms]"""
-    plant = load("config/actuator.yaml")
+    plant = config.load(resources.config("actuator.yaml"), Actuator)
     hf.simulate(plant, np.tile(FAULTS, (2, 1)), **how)  # compiles
     begun = time.process_time()
     i = hf.simulate(plant, np.tile(FAULTS, (SEEDS, 1)), seeds=np.arange(SEEDS), **how).i

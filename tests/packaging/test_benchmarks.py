@@ -22,6 +22,7 @@ SMALLEST = {
     "log": ({"N_SHORT": 3, "N_LONG": 8}, {}),
     "nuisance": ({"N": dict.fromkeys(("linear", "lf2", "lf1", "hf"), 2)}, {}),
     "prognosis": ({}, {"count": 30, "n_peer": 3}),
+    "switching": ({"SEEDS": 4, "TRIED": ({"located": True, "dt": 5e-6},)}, {}),
 }
 LEFT_OUT = {"instructions"}  # compiles the kernel for another processor: a minute
 
