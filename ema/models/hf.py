@@ -102,7 +102,7 @@ def simulate(
         Step; a divisor of the control period. [s]
     located : bool
         Comparators turn where a current leaves its band, found within the step (`ema.models.switching`); else, as if
-        asked once a step, at the next one. Not beside a dead time, a comparator's delay or a supply that sags.
+        asked once a step, at the next one.
     audited : bool
         Keep energy sums.
     n_threads : int
@@ -126,13 +126,7 @@ def simulate(
     z = parameters(plant, k, merged, dT)
     active = np.array([_is_active(z, name) for name in merged]).reshape(len(merged), n)
     acts_in = np.array([parts.needed(list(compress(merged, of_run))) for of_run in active.T])
-    if located:
-        if (acts_in & parts.INVERTER).any():
-            raise ConfigError(
-                "comparators that turn within a step (located) are not simulated beside dead_time, comparator_delay or "
-                "supply_sag: leave these out, or simulate with located=False"
-            )
-        acts_in |= parts.LOCATED
+    acts_in |= parts.LOCATED if located else 0
     z[:N_STATE] = start.T
     shared = z[row("clock_skew.shared")].copy()  # batches write to z
     clocks = z[[row(f"clock_skew.{name}") for name in ("rate", "currents", "late")]].T.copy()

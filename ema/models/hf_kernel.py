@@ -100,18 +100,24 @@ def electrical_step(z, l, N, dt, parts, audited):
         told_a, told_b, told_c = 1.0, 1.0, 1.0
         if len(parts) & SENSORS:
             told_a, told_b, told_c = 1.0 + z[GAIN_A * N + l], 1.0 + z[GAIN_B * N + l], 1.0 + z[GAIN_C * N + l]
-        (n_a, n_b, n_c), (s_a, s_b, s_c), work, heat = currents_after(
-            (i_a, i_b, i_c),
-            (e_a, e_b, e_c),
-            (z[S_A * N + l], z[S_B * N + l], z[S_C * N + l]),
-            (told_a, told_b, told_c),
-            (R_a, R_b, R_c),
-            (L_a, L_b, L_c),
-            (k_a * w_m, k_b * w_m, k_c * w_m),
-            0.5 * z[V_DC * N + l],
-            h,
-            dt,
-        )
+        currents, legs = (i_a, i_b, i_c), (z[S_A * N + l], z[S_B * N + l], z[S_C * N + l])
+        errors, told = (e_a, e_b, e_c), (told_a, told_b, told_c)
+        R, L, emf = (R_a, R_b, R_c), (L_a, L_b, L_c), (k_a * w_m, k_b * w_m, k_c * w_m)
+        if len(parts) & INVERTER:
+            u_dc = z[U_DC * N + l]
+            late = (
+                z[OFF_A * N + l], z[OFF_B * N + l], z[OFF_C * N + l], z[DELAY * N + l], z[DEAD_TIME * N + l],
+            )  # fmt: skip
+            (n_a, n_b, n_c), (s_a, s_b, s_c), off, work, heat = currents_after(
+                currents, errors, legs, told, R, L, emf, 0.5 * u_dc, h, dt, late
+            )
+            z[OFF_A * N + l], z[OFF_B * N + l], z[OFF_C * N + l] = off
+            i_dc = 0.5 * (s_a * i_a + s_b * i_b + s_c * i_c)
+            z[U_DC * N + l] = link_voltage(u_dc, z[V_DC * N + l], i_dc, z[SOURCE_R * N + l], z[SOURCE_C * N + l], dt)
+        else:
+            (n_a, n_b, n_c), (s_a, s_b, s_c), _, work, heat = currents_after(
+                currents, errors, legs, told, R, L, emf, 0.5 * z[V_DC * N + l], h, dt, ()
+            )
     else:
         s_a = comparator(z[S_A * N + l], e_a, h)
         s_b = comparator(z[S_B * N + l], e_b, h)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.core.errors import ConfigError
 from ema.models import hf
 
 N_RUNS = 32
@@ -67,6 +66,32 @@ def test_a_sensor_that_reads_too_much_moves_the_band(shipped_plant):
     assert some == pytest.approx(other, rel=0.01)
 
 
-def test_legs_that_follow_late_are_refused_in_one_line(shipped_plant):
-    with pytest.raises(ConfigError, match="located"):
-        hf.simulate(shipped_plant, np.zeros(6), located=True, effects={"dead_time": {"time": 1e-6}})
+LATE = [
+    {"comparator_delay": {"time": 2.3e-6}},
+    {"dead_time": {"time": 1.7e-6}},
+]
+
+
+@pytest.mark.parametrize("effects", LATE, ids=lambda e: next(iter(e)))
+def test_legs_that_follow_late_do_so_by_their_own_time_and_not_the_step_s(shipped_plant, effects):
+    some, fine = (local_means(shipped_plant, located=True, dt=dt, effects=effects) for dt in (1e-6, FINE))
+    none = local_means(shipped_plant, located=True, dt=FINE)
+    assert common_difference(some, fine) < 0.3 * common_difference(none, fine)
+
+
+@pytest.mark.parametrize("effects", LATE, ids=lambda e: next(iter(e)))
+def test_legs_that_follow_late_are_those_of_comparators_asked_often(shipped_plant, effects):
+    some = local_means(shipped_plant, located=True, dt=1e-6, effects=effects)
+    asked, none = (local_means(shipped_plant, dt=1.25e-7, effects=of) for of in (effects, {}))
+    assert common_difference(some, asked) < 0.5 * common_difference(none, asked)
+
+
+def test_a_supply_sags_under_what_the_legs_draw(shipped_plant):
+    sag = {"supply_sag": {"resistance": 1.0, "capacitance": 2e-3}}
+    some, asked = (
+        hf.simulate(shipped_plant, FAULTS, noise=False, effects=sag, located=located, dt=dt).u_dc[0]
+        for located, dt in ((True, 1e-6), (False, 1.25e-7))
+    )
+    below = shipped_plant.inverter.V_dc - asked
+    assert below.max() > 1.0
+    assert some == pytest.approx(asked, abs=0.05 * below.max())
