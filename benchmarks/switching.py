@@ -24,24 +24,29 @@ TRIED: list[dict[str, Any]] = [
 ]
 
 
-def _local_means(how: dict[str, Any]) -> tuple[np.ndarray, float]:
-    """Local means, shape (SEEDS, 3, n) [A], and processor time of a run. [ms]"""
-    plant = config.load(resources.config("actuator.yaml"), Actuator)
-    hf.simulate(plant, np.tile(FAULTS, (2, 1)), **how)  # compiles
-    begun = time.process_time()
-    i = hf.simulate(plant, np.tile(FAULTS, (SEEDS, 1)), seeds=np.arange(SEEDS), **how).i
-    took = 1e3 * (time.process_time() - begun) / SEEDS
-    return i[..., : i.shape[-1] // SHORT * SHORT].reshape(SEEDS, 3, -1, SHORT).mean(axis=-1), took
+def local_means(plant: Actuator, n: int, **how: Any) -> np.ndarray:
+    """Local means of the phase currents of runs with seeds of their own, shape (n, 3, n_means). [A]"""
+    i = hf.simulate(plant, np.tile(FAULTS, (n, 1)), seeds=np.arange(n), **how).i
+    return i[..., : i.shape[-1] // SHORT * SHORT].reshape(n, 3, -1, SHORT).mean(axis=-1)
+
+
+def common_difference(some: np.ndarray, others: np.ndarray) -> float:
+    """Rms of what means over all runs differ by, of products of two halves of the runs: chance adds nothing. [A]"""
+    one, other = (some[half::2].mean(axis=0) - others[half::2].mean(axis=0) for half in (0, 1))
+    return float(np.sqrt(max(float((one * other).mean()), 0.0)))
 
 
 def rows() -> list[dict[str, Any]]:
     """One row for what is off, and one for what a run costs, by step."""
-    fine, _ = _local_means(FINE)
+    plant = config.load(resources.config("actuator.yaml"), Actuator)
+    fine = local_means(plant, SEEDS, **FINE)
     found = []
     for how in TRIED:
-        means, took = _local_means(how)
-        one, other = (means[half::2].mean(axis=0) - fine[half::2].mean(axis=0) for half in (0, 1))
-        off = 1e3 * np.sqrt(max(float((one * other).mean()), 0.0))
+        local_means(plant, 2, **how)  # compiles
+        begun = time.process_time()
+        means = local_means(plant, SEEDS, **how)
+        took = 1e3 * (time.process_time() - begun) / SEEDS
+        off = 1e3 * common_difference(means, fine)
         name = f"HF, {'turns located' if how['located'] else 'asked once'}, step {1e6 * how['dt']:g} µs"
         found += [
             {"figure": f"{name}: means off by", "value": off, "unit": "mA", "seed": f"0…{SEEDS - 1}"},

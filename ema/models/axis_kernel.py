@@ -150,7 +150,9 @@ def lost(z, i):
 def gear(z, inertia, h):
     """Stiffness, damping, inertia, drag and friction beyond a gear that gives, and whether the drive acts there.
 
-    Zeros where it is stiff at steps of `h`.    d = 2 ζ √(J_m J_l / (J_m + J_l) / c)
+    Zeros where it is stiff at steps of `h`. J_a is what is measured, J_b what is beyond:
+
+    d = 2 ζ √(J_a J_b / (J_a + J_b) / c)
     """
     is_driven = z[AT_MOTOR] > 0.0
     first = AT_MOTOR if is_driven else AT_USER

@@ -74,6 +74,7 @@ def electrical_step(z, l, N, dt, parts, audited):
     L_a, L_b, L_c = z[L_A * N + l], z[L_B * N + l], z[L_C * N + l]
 
     # effects on the motor, on what the controller is told, six-step references
+    told_a, told_b, told_c = 1.0, 1.0, 1.0
     x_a, x_b, x_c = i_a, i_b, i_c
     if len(parts) & MOTOR:
         dT = z[DT * N + l]
@@ -86,9 +87,10 @@ def electrical_step(z, l, N, dt, parts, audited):
         L_b *= hooks.inductance_factor(z, l, N, i_b)
         L_c *= hooks.inductance_factor(z, l, N, i_c)
     if len(parts) & SENSORS:
-        x_a = (1.0 + z[GAIN_A * N + l]) * i_a + z[OFFSET_A * N + l]
-        x_b = (1.0 + z[GAIN_B * N + l]) * i_b + z[OFFSET_B * N + l]
-        x_c = (1.0 + z[GAIN_C * N + l]) * i_c + z[OFFSET_C * N + l]
+        told_a, told_b, told_c = 1.0 + z[GAIN_A * N + l], 1.0 + z[GAIN_B * N + l], 1.0 + z[GAIN_C * N + l]
+        x_a = told_a * i_a + z[OFFSET_A * N + l]
+        x_b = told_b * i_b + z[OFFSET_B * N + l]
+        x_c = told_c * i_c + z[OFFSET_C * N + l]
         n = sector(theta_e + p * hooks.angle_error(z, l, N, theta_m) + z[COMMUTATION * N + l])
     else:
         n = sector(theta_e)
@@ -96,15 +98,12 @@ def electrical_step(z, l, N, dt, parts, audited):
     # hysteresis comparators and leg voltages
     I_ref, h = z[I_REF * N + l], z[H * N + l]
     e_a, e_b, e_c = I_ref * six_step(n) - x_a, I_ref * six_step(n - 2.0) - x_b, I_ref * six_step(n + 2.0) - x_c
+    u_dc = z[U_DC * N + l] if len(parts) & INVERTER else z[V_DC * N + l]
     if len(parts) & LOCATED:
-        told_a, told_b, told_c = 1.0, 1.0, 1.0
-        if len(parts) & SENSORS:
-            told_a, told_b, told_c = 1.0 + z[GAIN_A * N + l], 1.0 + z[GAIN_B * N + l], 1.0 + z[GAIN_C * N + l]
         currents, legs = (i_a, i_b, i_c), (z[S_A * N + l], z[S_B * N + l], z[S_C * N + l])
         errors, told = (e_a, e_b, e_c), (told_a, told_b, told_c)
         R, L, emf = (R_a, R_b, R_c), (L_a, L_b, L_c), (k_a * w_m, k_b * w_m, k_c * w_m)
         if len(parts) & INVERTER:
-            u_dc = z[U_DC * N + l]
             late = (
                 z[OFF_A * N + l], z[OFF_B * N + l], z[OFF_C * N + l], z[DELAY * N + l], z[DEAD_TIME * N + l],
             )  # fmt: skip
@@ -112,11 +111,9 @@ def electrical_step(z, l, N, dt, parts, audited):
                 currents, errors, legs, told, R, L, emf, 0.5 * u_dc, h, dt, late
             )
             z[OFF_A * N + l], z[OFF_B * N + l], z[OFF_C * N + l] = off
-            i_dc = 0.5 * (s_a * i_a + s_b * i_b + s_c * i_c)
-            z[U_DC * N + l] = link_voltage(u_dc, z[V_DC * N + l], i_dc, z[SOURCE_R * N + l], z[SOURCE_C * N + l], dt)
         else:
             (n_a, n_b, n_c), (s_a, s_b, s_c), _, work, heat = currents_after(
-                currents, errors, legs, told, R, L, emf, 0.5 * z[V_DC * N + l], h, dt, ()
+                currents, errors, legs, told, R, L, emf, 0.5 * u_dc, h, dt, ()
             )
     else:
         s_a = comparator(z[S_A * N + l], e_a, h)
@@ -133,17 +130,13 @@ def electrical_step(z, l, N, dt, parts, audited):
                 share_of_step(off_b - dead, dt),
                 share_of_step(off_c - dead, dt),
             )
-            u_dc = z[U_DC * N + l]
             v_a = leg_voltage(s_a, i_a, u_dc, late_a, share_of_step(off_a, dt) - late_a)
             v_b = leg_voltage(s_b, i_b, u_dc, late_b, share_of_step(off_b, dt) - late_b)
             v_c = leg_voltage(s_c, i_c, u_dc, late_c, share_of_step(off_c, dt) - late_c)
             z[OFF_A * N + l] = max(off_a - dt, 0.0)
             z[OFF_B * N + l] = max(off_b - dt, 0.0)
             z[OFF_C * N + l] = max(off_c - dt, 0.0)
-            i_dc = 0.5 * (s_a * i_a + s_b * i_b + s_c * i_c)
-            z[U_DC * N + l] = link_voltage(u_dc, z[V_DC * N + l], i_dc, z[SOURCE_R * N + l], z[SOURCE_C * N + l], dt)
         else:
-            u_dc = z[V_DC * N + l]
             v_a, v_b, v_c = 0.5 * u_dc * s_a, 0.5 * u_dc * s_b, 0.5 * u_dc * s_c
         d_a, d_b = slopes(
             v_a - R_a * i_a - k_a * w_m,
@@ -159,6 +152,9 @@ def electrical_step(z, l, N, dt, parts, audited):
         m_a, m_b, m_c = 0.5 * (i_a + n_a), 0.5 * (i_b + n_b), 0.5 * (i_c + n_c)
         work = dt * (v_a * m_a + v_b * m_b + v_c * m_c)
         heat = dt * (R_a * i_a * m_a + R_b * i_b * m_b + R_c * i_c * m_c)
+    if len(parts) & INVERTER:
+        i_dc = 0.5 * (s_a * i_a + s_b * i_b + s_c * i_c)
+        z[U_DC * N + l] = link_voltage(u_dc, z[V_DC * N + l], i_dc, z[SOURCE_R * N + l], z[SOURCE_C * N + l], dt)
     z[S_A * N + l], z[S_B * N + l], z[S_C * N + l] = s_a, s_b, s_c
     z[I_A * N + l], z[I_B * N + l], z[I_C * N + l] = n_a, n_b, n_c
 

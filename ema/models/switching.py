@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from numba import njit
 
+from ema.effects.inverter import diode
+
 from . import jit
 
 MOST_TURNS = 2  # of a step: of three within 2 µs the third is late
@@ -47,8 +49,7 @@ def share_until_event(off_j, dead, dt):
 @_jit
 def leg(s_j, i_j, off_j, dead):
     """What a leg that follows late makes of half the bus voltage: as before, by its diodes, or as it is told."""
-    diode = -1.0 if i_j > 0.0 else 1.0
-    return -s_j if off_j > dead else (diode if off_j > 0.0 else s_j)
+    return -s_j if off_j > dead else (diode(i_j) if off_j > 0.0 else s_j)
 
 
 @_jit

@@ -5,24 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks import switching
+from benchmarks.switching import FAULTS, common_difference
 from ema.models import hf
 
 N_RUNS = 32
-SHORT = 25  # samples of a local mean
 FINE = 2.5e-7  # [s]
-FAULTS = np.array([0.05, 0.02, 0.0, 0.1, 0.05, 0.3])
 
 
-def local_means(plant, *, command=None, **how):
-    """Local means of the phase currents of runs with seeds of their own, shape (N_RUNS, 3, n). [A]"""
-    i = hf.simulate(plant, np.tile(FAULTS, (N_RUNS, 1)), command, seeds=np.arange(N_RUNS), n_threads=2, **how).i
-    return i[..., : i.shape[-1] // SHORT * SHORT].reshape(N_RUNS, 3, -1, SHORT).mean(axis=-1)
-
-
-def common_difference(some, others):
-    """Rms of what the means over all runs differ by, of products of two halves of the runs: chance adds nothing. [A]"""
-    one, other = (some[half::2].mean(axis=0) - others[half::2].mean(axis=0) for half in (0, 1))
-    return np.sqrt(max(float((one * other).mean()), 0.0))
+def local_means(plant, **how):
+    return switching.local_means(plant, N_RUNS, n_threads=2, **how)
 
 
 @pytest.fixture(scope="module")

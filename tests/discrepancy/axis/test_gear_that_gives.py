@@ -49,16 +49,20 @@ def test_the_resonance_is_looked_for_where_it_is(resonating):
     assert sum(float((r**2).sum()) for r in there) < 0.5 * sum(float((r**2).sum()) for r in without)
 
 
+def fitted_gear(plant, F_d):
+    """Parameters of the gear that was found, and of the axis, fitted to all windows."""
+    every, at = on_paper.everywhere(plant), {"F_d": F_d}
+    found = gear_candidate(plant, at, every)
+    fitted = fit(plant, [*plant.base, *found.free], {**at, **found.starts[0]}, every, max_iterations=30)
+    return {name.removeprefix(f"{found.effect}."): x for name, x in fitted.point.items()}
+
+
 @pytest.mark.parametrize("behind", [0.016, 0.0])
 def test_dry_friction_is_told_on_its_side_of_the_gear(support, behind):
     """At rest it holds a twist, and lets it go later than the motor begins: all of it at the motor, nothing is seen."""
     belt = support("belt_bench")
     file = {"J": belt.J_M + belt.J_L, "F_d": belt.F_M + belt.F_L, "C": belt.C, "k_t": belt.K_T}
-    plant = AxisPlant(RotaryAxis.model_validate(file), [belt.record(behind)], n_threads=1)
-    every, at = on_paper.everywhere(plant), {"F_d": file["F_d"]}
-    found = gear_candidate(plant, at, every)
-    fitted = fit(plant, [*plant.base, *found.free], {**at, **found.starts[0]}, every, max_iterations=30)
-    value = {name.removeprefix("gear_compliance."): x for name, x in fitted.point.items()}
+    value = fitted_gear(AxisPlant(RotaryAxis.model_validate(file), [belt.record(behind)], n_threads=1), file["F_d"])
     assert value["compliance"] == pytest.approx(1.0 / belt.STIFFNESS, rel=0.1)
     assert value["inertia"] == pytest.approx(belt.J_L, rel=0.1)
     assert value["friction"] == pytest.approx(behind, abs=0.15 * belt.F_L)
@@ -72,10 +76,7 @@ def test_a_motor_that_drives_a_measured_load_through_a_spring(support, behind):
     file = {"J": belt.J_M + belt.J_L, "F_d": belt.F_M + belt.F_L, "C": belt.C, "k_t": belt.K_T, "measured_at": "load"}
     plant = AxisPlant(RotaryAxis.model_validate(file), [belt.record(behind, at_load=True)], n_threads=1)
     plant.between = "held"
-    every, at = on_paper.everywhere(plant), {"F_d": file["F_d"]}
-    found = gear_candidate(plant, at, every)
-    fitted = fit(plant, [*plant.base, *found.free], {**at, **found.starts[0]}, every, max_iterations=30)
-    value = {name.removeprefix("drive_compliance."): x for name, x in fitted.point.items()}
+    value = fitted_gear(plant, file["F_d"])
     assert value["compliance"] == pytest.approx(1.0 / belt.STIFFNESS, rel=0.1)
     assert value["inertia"] == pytest.approx(belt.J_M, rel=0.1)
     assert value["F_d"] == pytest.approx(behind, abs=0.15 * belt.F_L)
