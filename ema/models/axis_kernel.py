@@ -286,9 +286,12 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
                 else:
                     i = u
             tau_m = i if mode == FORCE else z[K_T] * emf_factor(z, 0, 1, i, z[DT]) * i
-            # positions half a step ahead: second order for everything but friction
+            # half a step ahead, the speed as it changed in the last step: second order for all but turning round
             theta_mid = theta + 0.5 * h * w
-            tau = (0.0 if is_driven else tau_m) - torques(z, lines, terms, theta_mid, w, i, t_mid)
+            w_mid = w + 0.5 * dw
+            if w_mid * w <= 0.0:
+                w_mid = w
+            tau = (0.0 if is_driven else tau_m) - torques(z, lines, terms, theta_mid, w_mid, i, t_mid)
             if stiffness > 0.0:
                 T = stiffness * (theta_mid - theta_b - 0.5 * h * w_b) + damping * (w - w_b)
                 tau -= T
@@ -297,7 +300,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
                 dw_b = rubbing_speed_after(w_b, pull, rubbing, h / J_b) - w_b
                 w_b += dw_b
                 theta_b += 0.5 * h * w_b
-            w_sliding = w if slide == 0.0 else slide * max(w * slide, CREEP)
+            w_sliding = w_mid if slide == 0.0 else slide * max(w_mid * slide, CREEP)
             F_s, F_d = friction(z, lines, terms, theta_mid, w_sliding, tau, tau_m, i, t_mid)
             if friction_memory.is_slow(F_d, deflection, J_a, h):
                 bristle = friction_memory.built_up(bristle, 0.5 * h * w, deflection)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from ema.core.errors import ConfigError
@@ -84,6 +85,26 @@ def test_halving_the_step_changes_nothing_that_counts():
     plant = FREE.model_copy(update={"F_d": 0.003, "F_s": 0.003})
     coarse, fine = (run(plant, "current", i, h=h) for h in (2.5e-4, 2.5e-5))
     assert np.max(np.abs(coarse[1] - fine[1])) < 2e-3 * np.max(np.abs(fine[1]))
+
+
+def test_friction_that_falls_with_speed_is_of_second_order_in_the_step():
+    J, F, e, w_s = 7.2e-6, 6.6e-3, 0.38, 8.0
+    plant = FREE.model_copy(update={"J": J, "F_d": F, "F_s": F * (1.0 + e)})
+    t = T[:80]
+    i = 0.132 + 0.25 * np.sin(2.0 * np.pi * 8.0 * t + 1.2)
+
+    def law(at, w):
+        return (0.05 * np.interp(at, t, i) - F * (1.0 + e * np.exp(-w / w_s))) / J
+
+    exact = solve_ivp(law, (0.0, t[-1]), [6.0], t_eval=t, rtol=1e-10, atol=1e-10, max_step=1e-4).y[0]
+    effects = {"stribeck": {"excess": e, "speed": w_s, "shape": 0.0}}
+    coarse, fine = (
+        np.abs(run(plant, "current", i, effects=effects, start=(0.0, 6.0), t=t, h=h)[1] - exact).max()
+        for h in (1e-3, 2.5e-4)
+    )
+    assert exact.min() > 0.0
+    assert fine < coarse / 12.0  # of 16
+    assert fine < 1e-4 * exact.max()
 
 
 def test_linear_axis_driven_by_force():
