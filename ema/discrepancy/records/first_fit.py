@@ -28,6 +28,7 @@ MOST = 2000  # of a record, evenly; the search over orders takes its time
 BESIDE = 0.03  # of its size that a column must have beside the others: one speed does not tell drag from friction
 CLEAR = 3.0  # deviations from which a value is shown
 SWINGS = 0.3  # [rad] of travel that shows a pendulum apart from a straight line
+SEEN = 0.5 * np.pi  # of a line's phase, from one sample to the next; beyond, it is sampled too seldom
 BOX = np.full(OVER, 1.0 / OVER)
 _K = np.arange(OVER) - OVER // 2
 SLOPE = np.cumsum(-_K / float(_K @ _K))[:-1]  # what the slope over some samples sees of a derivative
@@ -109,6 +110,9 @@ def _orders(weak: Weak) -> tuple[float, ...]:
     orders = integer_orders(weak)
     if float(np.ptp(weak.motion.theta)) > SWINGS:
         orders = np.union1d([1.0], orders)
+    m, at = weak.motion, weak.index[:, weak.index.shape[1] // 2]
+    way = float(np.median(np.abs(m.w[at]))) * float(np.median(np.abs(np.diff(m.t))))
+    orders = orders[orders * way < SEEN]
     return scan(weak, orders).orders if len(orders) else ()
 
 

@@ -42,7 +42,7 @@ _WORDS = {
     "torque": "torque tau moment effort trq drehmoment",
     "duty": "duty pwm dutycycle",
     "temperature": "temperature temp temperatur",
-    "enabled": "enabled enable active",
+    "enabled": "enabled enable active freigabe",
 }
 
 

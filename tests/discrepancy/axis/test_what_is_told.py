@@ -156,7 +156,7 @@ def corrected_of(times):
     plain = plain_of(plant.plant)
     found = rows_of(plant, own, halves)
     model = regress(found, plain, [])
-    return model, attenuation(plant, own, halves, plain, model, 0.0)
+    return model, attenuation(own, lambda noisier: rows_of(plant, noisier, halves), plain, model)
 
 
 def test_what_noise_takes_from_the_inertia_is_given_back():

@@ -12,34 +12,26 @@ American Statistical Association 89, 1994.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
 from .course import Course
-from .integrated import integrate_rows
 from .regression import Corrected, Plain, Regression, regress
-
-if TYPE_CHECKING:
-    from ema.discrepancy.axis.measured import Measured
+from .rows import Rows
 
 N_DRAWS = 4
 UNSURE = 0.5  # of the correction, as its standard deviation
 
 
 def attenuation(
-    plant: Measured,
-    courses: list[Course],
-    halves: dict[str, float],
-    plain: Plain,
-    model: Regression,
-    unsure: float,
+    courses: list[Course], integrate: Callable[[list[Course]], Rows | None], plain: Plain, model: Regression
 ) -> Corrected:
-    """Coefficients of `model` with the effect of the sensors' noise undone."""
+    """Coefficients of `model` with the effect of the sensors' noise undone; `integrate` makes rows of courses."""
     rng = np.random.default_rng(0)
     moved = []
     for _ in range(N_DRAWS if any(not c.static for c in courses) else 0):
-        noisier = integrate_rows(plant, [c if c.static else c.disturbed(rng) for c in courses], halves, unsure)
+        noisier = integrate([c if c.static else c.disturbed(rng) for c in courses])
         if noisier is not None:
             again = regress(noisier, plain, model.laws)
             if again.base == model.base:

@@ -67,6 +67,8 @@ class Balance:
         Where several records are given: each coefficient record by record.
     given : tuple of Law
         What the plant file declares beside inertia, friction and drag: a neighbouring axis.
+    creeps : float
+        Share of the rows that is left out since friction acts otherwise there than in sliding.
     """
 
     model: Regression
@@ -80,6 +82,7 @@ class Balance:
     noise: float
     agreements: tuple[Agreement, ...] = ()
     given: tuple[Law, ...] = ()
+    creeps: float = 0.0
 
     def confidence(self, term: Term) -> float:
         """How often the law wins, times its mark over that and what of the rest it may have been taken for.

@@ -28,17 +28,25 @@ if TYPE_CHECKING:
 
 MAX_ROWS = 3000
 FEWEST = 40  # rows from which a regression is worth it
+SMOOTHED = 0.5  # of a test function's width, over which a motion that is seen clearly is smoothed
 N_BLOCKS = 64  # the records are cut into about so many
 
 
 def integrate_rows(
-    plant: Measured, courses: list[Course], halves: dict[str, float] | None = None, unsure: float = 0.0
+    plant: Measured,
+    courses: list[Course],
+    halves: dict[str, float] | None = None,
+    unsure: float = 0.0,
+    seen: dict[str, float] | None = None,
 ) -> Rows | None:
     """Rows of all courses; None where there are too few to say anything. `halves`: half widths by record. [s]
 
-    `unsure`: share of a row in which the axis may rest; where 0, it also turns round in none.
+    `seen`: half widths over which the motion is seen clearly, where those of the rows are wider: it is smoothed less
+    then, since a pendulum acts where the axis is. `unsure`: share of a row in which the axis may rest; where 0, it also
+    turns round in none.
     """
     widths = halves or half_widths(courses)
+    smooth = {r: max(seen[r], SMOOTHED * half) for r, half in widths.items()} if seen else widths
     total = sum(float(np.ptp(c.t)) for c in courses if not c.static) or 1.0
     widest = max(widths.values(), default=0.0)
     length, short = max(total / N_BLOCKS, 4.0 * widest), max(total / N_BLOCKS, 2.0 * widest)
@@ -50,7 +58,7 @@ def integrate_rows(
     model = plant.model({})
     motions, pieces, matrices, derivatives, offset, block, piece = [], [], [], [], 0, 0, 0
     for c in courses:
-        motion = at_rest(plant, model, c) if c.static else smooth_motion(plant, model, c, widths[c.record])
+        motion = at_rest(plant, model, c) if c.static else smooth_motion(plant, model, c, smooth[c.record])
         motions.append(motion)
         n = len(c.t)
         if c.static:

@@ -15,6 +15,7 @@ from .apart import apart
 from .attenuation import attenuation
 from .choice import choose_laws
 from .course import Course, courses
+from .creeping import chosen, leave_creeping_out, slides
 from .found import Balance
 from .integrated import integrate_rows
 from .law import Acting, Law
@@ -33,8 +34,14 @@ CONSTANT = 0.02  # share by which a voltage must change to drive by more than it
 APART = 0.05  # of a law's size that must stand out of what inertia, dry friction and drag do
 N_WIDTHS = 3  # rounds
 MOVED = 2.0  # deviations of the difference between two widths, from which an inertia is another
-N_WIDER = 3  # times that test functions are made twice as wide
+TOLD = 1.0 / 3.0  # error of an inertia, as its share, with which the motions show one
+AS_SURE = 2.0  # times larger may the error of an inertia be that is told about as surely
+SURER = 3.0  # times smaller is that of one that is told much better
+N_WIDER = 6  # times that test functions are made twice as wide
 LONG = 0.5  # share of a row that must show which way friction acts, however small that is
+
+
+Halves = dict[str, float]  # half width by record [s]
 
 
 def plain_of(p: Axis) -> Plain:
@@ -53,6 +60,10 @@ def balance(plant: Measured) -> Balance | None:
     linear = isinstance(p, LinearAxis)
     if _is_given(plant, recorded, found):
         return None
+
+    def choose(rows: Rows) -> Balance:
+        return choose_laws(rows, plain, shown_by(rows, list(every_law(rows, linear=linear))), given(rows))
+
     size = float(np.sqrt(np.mean(found.drive**2)))
     answer, widths, unsure = None, None, 0.0
     for _ in range(N_WIDTHS):  # how wide test functions must be depends on what stands beside the acceleration
@@ -63,24 +74,29 @@ def balance(plant: Measured) -> Balance | None:
         widths = wider if widths is None else {name: max(wider[name], widths[name]) for name in wider}
         unsure = unsure_share(first, plain, size)
         found = integrate_rows(plant, recorded, widths, unsure) or found
-        answer = choose_laws(found, plain, shown_by(found, list(every_law(found, linear=linear))), given(found))
+        answer = choose(found)
     assert answer is not None
     assert widths is not None
+    seen = widths
     for _ in range(N_WIDER):
-        wide = dict(widths)
-        for name, half in widths.items():  # what swings besides in one record says nothing of another
-            own = {**widths, name: 2.0 * half}
-            slower = integrate_rows(plant, recorded, own, unsure)
-            if slower is not None and not _has_no_room(recorded, own) and _is_moved(answer.model, slower, plain):
-                wide[name] = own[name]
+        wide = {
+            name: half if _is_wide_enough(plant, recorded, widths, seen, name, answer.model, unsure) else 2.0 * half
+            for name, half in widths.items()
+        }
         if wide == widths:
             break
-        found, widths = integrate_rows(plant, recorded, wide, unsure) or found, wide
-        answer = choose_laws(found, plain, shown_by(found, list(every_law(found, linear=linear))), given(found))
+        found, widths = integrate_rows(plant, recorded, wide, unsure, seen) or found, wide
+        answer = choose(found)
+    answer = leave_creeping_out(answer, choose)
+
+    def again(noisier: list[Course]) -> Rows | None:
+        rows = integrate_rows(plant, noisier, widths, unsure, seen)
+        return chosen(rows, slides(rows)) if rows is not None and answer.creeps else rows
+
     return replace(
         answer,
-        corrected=attenuation(plant, recorded, widths, plain, answer.model, unsure),
-        agreements=tuple(agreements(found, plain, answer.model)),
+        corrected=attenuation(recorded, again, plain, answer.model),
+        agreements=tuple(agreements(answer.model.rows, plain, answer.model)),
     )
 
 
@@ -88,22 +104,47 @@ def _has_no_room(recorded: Sequence[Course], widths: dict[str, float]) -> bool:
     return any(not c.static and float(np.ptp(c.t)) < LONGEST * widths[c.record] for c in recorded)
 
 
-def _is_moved(model: Regression, slower: Rows, plain: Plain) -> bool:
-    """Whether slower test functions give another inertia: then the quick part of the motion is none that the laws make.
+def _is_wide_enough(
+    plant: Measured,
+    recorded: list[Course],
+    halves: Halves,
+    seen: Halves,
+    name: str,
+    model: Regression,
+    unsure: float,
+) -> bool:
+    """Whether in one record slower test functions give no other inertia that is as sure, and none much surer.
 
-    A frame that swings, a gear that gives or noise beyond what the sensors are known to have takes from every
-    coefficient, the more the narrower test functions are (Hausman, "Specification tests in econometrics",
-    Econometrica 46, 1978).
+    Where they do, the quick part of the motion is none that the laws make. A frame that swings, a gear that gives or
+    noise beyond what the sensors are known to have takes from every coefficient, the more the narrower test functions
+    are (Hausman, "Specification tests in econometrics", Econometrica 46, 1978). Above a resonance all agree on the
+    inertia of one side of it, so they are held against every width that the record has room for.
     """
+    here = _inertia(model)
+    own = {**halves, name: 2.0 * halves[name]}  # what swings besides in one record says nothing of another
+    while here is not None and not _has_no_room(recorded, own):
+        slower = integrate_rows(plant, recorded, own, unsure, seen)
+        there = _inertia(regress(slower, plain_of(plant.plant), model.laws)) if slower is not None else None
+        if there is not None and _is_better(here, there):
+            return False
+        own[name] *= 2.0
+    return True
+
+
+def _inertia(model: Regression) -> tuple[float, float] | None:
+    """The inertia and its variance, where the motions show one."""
     if "inertia" not in model.base:
-        return False
-    other = regress(slower, plain, model.laws)
-    if other.base != model.base:
-        return False
+        return None
     k = model.base.index("inertia")
-    here, there = float(model.coefficients[k]), float(other.coefficients[k])
-    spread = float(np.sqrt(abs(other.covariance()[k, k] - model.covariance()[k, k])))
-    return abs(there - here) > max(MOVED * spread, INEXACT * max(abs(here), abs(there)))
+    return float(model.coefficients[k]), float(model.covariance()[k, k])
+
+
+def _is_better(here: tuple[float, float], there: tuple[float, float]) -> bool:
+    """Whether slower test functions, `there`, give another inertia that is about as sure, or tell it much better."""
+    (a, V), (b, W) = here, there
+    error, slower = float(np.sqrt(V)) / max(abs(a), 1e-300), float(np.sqrt(W)) / max(abs(b), 1e-300)
+    moved = abs(b - a) > max(MOVED * float(np.sqrt(abs(W - V))), INEXACT * max(abs(a), abs(b)))
+    return slower < TOLD and ((moved and slower < AS_SURE * error) or SURER * slower < error)
 
 
 def every_law(found: Rows, *, linear: bool) -> list[Law]:

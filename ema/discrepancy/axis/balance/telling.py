@@ -42,6 +42,7 @@ def describe(b: Balance, *, linear: bool) -> dict[str, Any]:
         "base": {name: _base(b, k, name, samples, linear) for k, name in enumerate(b.model.base)},
         **({"given": [of_law(b, law, samples) for law in b.given]} if b.given else {}),
         "terms": [_term(b, term, samples) for term in b.terms],
+        **({"creeps": _short(b.creeps)} if b.creeps else {}),
         **({"by_record": by_record(b.agreements, b.model.rows.motion.records, linear=linear)} if b.agreements else {}),
     }
 
@@ -99,18 +100,22 @@ def _term(b: Balance, term: Term, samples: Array) -> dict[str, Any]:
 def sentences(balance: dict[str, Any]) -> list[str]:
     """What an engineer would say of it."""
     what = "force" if balance["unit"] == "N" else "torque"
-    share = balance["explained"]
+    parts = balance["explained"]
     base = ", ".join(_number(SAID[name], q) for name, q in balance["base"].items())
     base += "".join(f", and {law['sentence']}," for law in balance.get("given", ()))
-    alone = f"{share['fitted']:.1%}" if share["fitted"] > 0.0 else "none"
+    alone = f"{parts['fitted']:.1%}" if parts["fitted"] > 0.0 else "none"
     out = [f"Balance of {what} along the measured motion: {base} explain {alone} of the drive's {what}"]
     if balance["terms"]:
         found = "; ".join(_said(term) for term in balance["terms"])
-        out[0] += f"; with {len(balance['terms'])} more, {_close(share['with_laws'])}: {found}"
+        out[0] += f"; with {len(balance['terms'])} more, {_close(parts['with_laws'])}: {found}"
     left = balance["left_rms"] / max(balance["noise_rms"], 1e-300)
     out[0] += (
         f". {balance['left_rms']:.3g} {balance['unit']} rms is left, {left:.2g} times what the sensors' noise makes."
     )
+    if share := balance.get("creeps"):
+        out[0] += (
+            f" {share:.0%} of it, where the axis creeps, is left out: friction acts otherwise there than in sliding."
+        )
     if run := balance.get("free_run"):
         out[0] += f" Free runs with these numbers miss {run['err']:.2%} ({run['noise_floor']:.2%} is noise)."
     if loop := balance.get("closed_loop"):
