@@ -118,8 +118,8 @@ def _mechanical(fit: FirstFit, sheet: Sheet, drive: str, *, linear: bool) -> lis
     known += [] if sheet.gear is None else _gear(sheet, drive)
     if sheet.pole_pairs and not linear:
         known.append(Known("p", str(sheet.pole_pairs), "data sheet"))
-    fitted = f"[{mass}]" if sheet.J is None else "[]"
-    known.append(Known("fitted", fitted, "what `ema discrepancy` fits in every model"))
+    free = [mass] * (sheet.J is None) + ["C"] * (fit.drag is not None)  # a start is no number to hold on to
+    known.append(Known("fitted", f"[{', '.join(free)}]", "what `ema discrepancy` fits in every model"))
     return known
 
 

@@ -29,7 +29,7 @@ def test_an_axis_gets_its_inertia_and_friction_from_the_record(tmp_path):
     assert pytest.approx(J, rel=0.05) == plant.J
     assert pytest.approx(C, rel=0.3) == plant.C
     assert pytest.approx(F_D, rel=0.2) == plant.F_d
-    assert (plant.k_t, plant.p, plant.fitted) == (K_T, 7, ("J",))
+    assert (plant.k_t, plant.p, plant.fitted) == (K_T, 7, ("J", "C"))
     text = path.read_text()
     assert "fitted to the records" in text
     assert "data sheet" in text

@@ -47,6 +47,14 @@ def test_a_pendulum_is_no_inertia():
     assert found.inertia == pytest.approx(on_paper.J, rel=0.05)
 
 
+def test_a_line_that_passes_between_two_samples_is_not_looked_for():
+    t = np.arange(0.0, 120.0, 0.02)
+    w = 300.0 + 250.0 * np.sin(0.3 * t) + 40.0 * np.sin(1.1 * t)  # up to two turns from one sample to the next
+    theta = np.cumsum(w) * 0.02
+    torque = on_paper.J * np.gradient(w, t) + on_paper.C * w + on_paper.F_D + 0.5 * np.sin(theta)
+    assert fit_of(Cycle(0, {"t": t, "w_m": w}), torque=torque).orders == ()
+
+
 def test_what_does_not_move_or_has_no_torque_shows_nothing():
     still = Cycle(0, {"t": T, "theta_m": np.zeros(len(T)), "w_m": np.zeros(len(T)), "i_q": np.zeros(len(T))})
     assert fit_of(still) == first_fit.FirstFit(None, None, None)
@@ -64,10 +72,10 @@ def test_each_parameter_is_marked_by_where_it_is_from():
     assert float(own["J"].value.split()[0]) == pytest.approx(on_paper.J, rel=0.02)
     assert "fitted to the records" in own["J"].origin
     assert own["k_t"].origin == "data sheet"
-    assert own["fitted"].value == "[J]"
+    assert own["fitted"].value == "[J, C]"  # a start, both
     given = known(Record((on_paper.cycle(),)), k_t=on_paper.K_T, J=3e-4)
     assert (given["J"].value, given["J"].origin) == ("0.0003 kg m^2", "data sheet")
-    assert given["fitted"].value == "[]"
+    assert given["fitted"].value == "[C]"
     assert "a guess" in known(Record((on_paper.cycle(),)))["k_t"].origin
 
 
