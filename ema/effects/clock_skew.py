@@ -30,7 +30,7 @@ EFFECT = Effect(
         "rate": " the recorder's is off by {rate:+.2g}",
         "shared": " that which recorder and controller share is off by {shared:+.2g}",
         "currents": " that of the currents (or of the drive) is off by {currents:+.2g}",
-        "late": " the currents are sampled {late:+.2g} s after the other channels",
+        "late": " the currents (or the drive) are sampled {late:+.2g} s after the other channels",
     },
     separated_by="a record with an external time mark",
     mistaken_for=("k1", "k2"),

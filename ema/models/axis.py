@@ -130,6 +130,11 @@ def lag_of_drive(numbers: Model) -> float:
     return float(numbers.z[row("drive_lag.time")] / (1.0 + numbers.z[row("clock_skew.rate")]))
 
 
+def clock_of_drive(numbers: Model) -> tuple[float, float]:
+    """By what share the interval of the drive's samples is off, and how late they are taken after the rest. [1, s]"""
+    return float(numbers.z[row("clock_skew.currents")]), float(numbers.z[row("clock_skew.late")])
+
+
 def acting_drive(lag: float, t: Array, recorded: Array, between: str = "straight") -> Array:
     """What acts of a recorded drive that is followed with a time constant; arguments as in `simulate`."""
     return follow(t, recorded, lag, BETWEEN[between]) if lag > 0.0 else recorded

@@ -14,6 +14,7 @@ from ema.discrepancy.axis.balance.integrated import integrate_rows
 from ema.discrepancy.axis.balance.laws import laws
 from ema.discrepancy.axis.balance.of_records import shown_by
 from ema.discrepancy.axis.balance.telling import describe
+from ema.discrepancy.axis.between import examine_ways
 from ema.discrepancy.axis.closed_loop import closed_loop
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.models.axis_config import LinearAxis, RotaryAxis
@@ -155,3 +156,24 @@ def test_what_one_speed_in_one_direction_cannot_show_is_not_tried(positioner):
     shown = {law.name for law in shown_by(found, list(laws(found.motion, linear=True)))}
     assert not {"constant_load", "quadratic_drag", "viscous_by_direction"} & shown
     assert "spring_load" in shown
+
+
+@pytest.mark.parametrize("late", [3e-4, -2e-4], ids=["filtered", "early"])
+def test_a_drive_that_is_recorded_at_another_time_is_told_so_and_is_no_drifting_clock(axis_bench, late):
+    bench, rng = axis_bench.Bench(), np.random.default_rng(3)
+    noise, bench.noise = bench.noise, dict.fromkeys(bench.noise, 0.0)
+    cycles = []
+    for c in axis_bench.record(bench, rng).cycles:
+        c.channels["i_q"] = np.interp(c["t"] - late, c["t"], c["i_q"])  # currents run straight there
+        loud = {name: c[name] + 0.2 * rms * rng.standard_normal(c.n_samples) for name, rms in noise.items()}
+        cycles.append(Cycle(c.number, {name: x[4:-4] for name, x in {**c.channels, **loud}.items()}))
+    plant_file = {**axis_bench.PLANT, "noise": {name: 0.2 * rms for name, rms in axis_bench.PLANT["noise"].items()}}
+    plant = AxisPlant(RotaryAxis.model_validate(plant_file), [Record(tuple(cycles))])
+    outcome = examine_ways(plant)
+    (found,) = outcome.effects
+    assert outcome.verdict == "explained"
+    assert found["name"] == "clock_skew"
+    assert found["parameters"]["late"]["value"] == pytest.approx(-late, rel=0.05)
+    # a lag of the drive is as late, to first order; nothing makes it early
+    assert found["indistinguishable_from"] == ([] if late > 0.0 else ["drive_lag"])
+    assert "currents" not in found["parameters"] or found["parameters"]["currents"]["value"] == 0.0

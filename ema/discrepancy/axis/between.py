@@ -18,17 +18,16 @@ import numpy as np
 from ema.discrepancy.examine import examine
 from ema.discrepancy.fitting import fit
 from ema.discrepancy.outcome import Outcome
-from ema.discrepancy.plant import Point
+from ema.discrepancy.plant import Free, Point
 from ema.discrepancy.progress import Progress
 from ema.discrepancy.selection import ODDS, Tried, above_noise, compare, fit_base, refit
 from ema.discrepancy.verdict import judge
 
 from .plant import AxisPlant
-from .screened import begin_at
 
 LATE = {"straight": 0.0, "held": 0.5, "held before": -0.5}  # samples by which the motion is later than straight
 DELAYS = {"position_delay.time": {"theta_m", "q"}, "speed_delay.time": {"w_m", "v"}}  # and the channels they are of
-LAG = "drive_lag.time"
+OF_DRIVE = {"drive_lag.time": 0.0, "clock_skew.late": -np.inf}  # what else makes the motion late, and the least of it
 MUCH = 0.5  # share of what is left above noise, from which another way is taken
 NEARLY_HALF = 0.25  # samples by which half a sample may be missed
 ALIKE, LITTLE = 1.05, 2e-3  # times what is left, or share in power of what there was: fewer effects are preferred
@@ -72,7 +71,7 @@ def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
                 "the record does not show whether the speed loop acts between its samples too: intervals hold both"
             )
             return outcome
-    _widen_lag(plant, outcome)
+    _widen_delay(plant, outcome)
     return _say_way(plant, outcome)
 
 
@@ -121,10 +120,11 @@ class Rereading:
 def _is_no_worse(taken: Tried, further: Tried) -> bool:
     """Whether records taken another way foretell as much as with a further effect.
 
-    A lag of the drive is half a sample where it is held, and has a parameter to fit besides: it must be clearly better.
+    A drive that is held is half a sample late, and what delays it has a parameter to fit besides: it must be clearly
+    better.
     """
     gain = compare(further, taken)
-    return not gain.is_clear if further.accepted[-1].effect == "drive_lag" else gain.gain <= 0.0
+    return not gain.is_clear if any(f.name in OF_DRIVE for f in further.accepted[-1].free) else gain.gain <= 0.0
 
 
 def _find_doubt(plant: AxisPlant, outcome: Outcome) -> str:
@@ -192,7 +192,7 @@ def _plain(plant: AxisPlant, way: str) -> Tried:
 
 
 def _beside(plant: AxisPlant, outcome: Outcome) -> str:
-    """The likelier way, though nothing was fitted for it, or held where sensors or the drive are half a sample late.
+    """The likelier way, though nothing was fitted for it, or that by which sensors or the drive are half a sample late.
 
     It counts where nothing but noise is left too: taken for straight, a held drive is half a sample early, in a swing
     that is less drag than there is, and less drag is what tells a heavier axis from a drive that reads too much.
@@ -215,38 +215,45 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     seen = {name for b in plant.benches for name in b.roles.outputs}
     late = np.array([outcome.point.get(name, 0.0) for name, of in DELAYS.items() if seen & of]) / period
     by_half = len(late) > 0 and bool((np.abs(late - LATE["held"]) < NEARLY_HALF).all())
-    by_half |= abs(outcome.point.get(LAG, 0.0) / period - LATE["held"]) < NEARLY_HALF
-    return "held" if here == "straight" and by_half else here
+    later = sum(outcome.point.get(name, 0.0) for name in OF_DRIVE) / period
+    by_drive = [way for way in LATE if way != "straight" and abs(later - LATE[way]) < NEARLY_HALF]
+    return ("held" if by_half else next(iter(by_drive), here)) if here == "straight" else here
 
 
 def _period(plant: AxisPlant) -> float:
     return float(np.median([w.period for w in plant.windows if not w.static]))
 
 
-def _widen_lag(plant: AxisPlant, outcome: Outcome) -> None:
-    """Let the interval of a drive's lag hold what it is with each way that the records do not rule out."""
-    lags = [e["parameters"]["time"] for e in outcome.effects if e["name"] == "drive_lag"]
-    if not lags:
-        return
+def _widen_delay(plant: AxisPlant, outcome: Outcome) -> None:
+    """Let the interval of what delays the drive hold what it is with each way that the records do not rule out."""
+    for name in OF_DRIVE.keys() & outcome.point.keys():
+        effect, parameter = name.split(".")
+        told = [e["parameters"][parameter] for e in outcome.effects if e["name"] == effect]
+        _widen_by_ways(plant, outcome, name, told)
+
+
+def _widen_by_ways(plant: AxisPlant, outcome: Outcome, name: str, told: list[dict[str, float]]) -> None:
     blocks, here, fits = list(range(len(plant.blocks))), plant.between, {}
-    free = [*plant.base, *begin_at("drive_lag", {"time": outcome.point[LAG]}, {}).free]
+    period = _period(plant)
+    delay = Free(name, "s", OF_DRIVE[name], np.inf, outcome.point[name], 0.1 * period)
     for way in LATE:
         plant.between = way
-        point = _shorten_delays(outcome.point, (LATE[way] - LATE[here]) * _period(plant))
-        fits[way] = fit(plant, free, point, blocks)
+        point = _shorten_delays(outcome.point, (LATE[way] - LATE[here]) * period)
+        fits[way] = fit(plant, [*plant.base, delay], point, blocks)
     plant.between = here
     tried = {way: Tried((), (), (), tuple(f.residuals)) for way, f in fits.items()}
     for way, f in fits.items():
         if not compare(tried[here], tried[way]).is_clear:
-            for lag in lags:
-                later = f.point[LAG] - fits[here].point[LAG]
-                lag["low"] = max(lag["low"] + min(later, 0.0), 0.0)
-                lag["high"] += max(later, 0.0)
+            for interval in told:
+                later = f.point[name] - fits[here].point[name]
+                interval["low"] = max(interval["low"] + min(later, 0.0), OF_DRIVE[name])
+                interval["high"] += max(later, 0.0)
 
 
 def _shorten_delays(point: Point, by: float) -> Point:
     """The point with what delays it has shorter, as far as they go."""
-    return {**point, **{name: max(point[name] - by, 0.0) for name in (*DELAYS, LAG) if name in point}}
+    least = {**dict.fromkeys(DELAYS, 0.0), **OF_DRIVE}
+    return {**point, **{name: max(point[name] - by, low) for name, low in least.items() if name in point}}
 
 
 def _is_simpler(other: Outcome, one: Outcome) -> bool:

@@ -50,7 +50,7 @@ def library(plant: Measured, point: Point, blocks: Sequence[int]) -> list[Candid
     s = sizes(plant)
     found = [c for name in registry() if (c := _candidate(plant, s, name, point)) is not None]
     searched = (
-        _clock_of_the_drive(plant, s, point),
+        *_clocks_of_the_drive(plant, s, point),
         cogging_candidate(plant, point, blocks),
         gear_candidate(plant, point, blocks),
         stretch_candidate(plant, s, point, blocks),
@@ -80,13 +80,23 @@ def _candidate(plant: Measured, s: AxisSizes, name: str, point: Point) -> Candid
     return Candidate(name, name, free, tuple(grid), neutral)
 
 
-def _clock_of_the_drive(plant: Measured, s: AxisSizes, point: Point) -> Candidate | None:
-    """A drive that is sampled by a clock of its own: what it is late by adds up from the record's start to its end."""
-    name = "clock_skew.currents"
+def _clocks_of_the_drive(plant: Measured, s: AxisSizes, point: Point) -> list[Candidate]:
+    """A drive sampled by a clock of its own: what it is late by adds up over the record, or is the same throughout.
+
+    A commanded speed is no reading, and how late it is a matter of its loop.
+    """
     moving = [w for w in plant.windows if not w.static]
     if not moving or any(key.startswith("clock_skew.") for key in point):
-        return None
+        return []
     sample = s.period / max(float(np.ptp(w.course[0])) for w in moving)  # of clock error, late by one at the end
-    free = (Free(name, "1", -200.0 * sample, 200.0 * sample, sample, 0.2 * sample),)
-    starts = tuple({name: x * sample} for x in (-5.0, -1.0, 1.0, 5.0))
-    return Candidate("clock_skew of the drive", "clock_skew", free, starts, {name: 0.0})
+    found = [_clock("clock_skew of the drive", "clock_skew.currents", "1", sample, 200.0, (1.0, 5.0))]
+    if s.driven_by != "speed-loop":
+        found.append(_clock("clock_skew by a constant time", "clock_skew.late", "s", s.period, 20.0, (0.3, 3.0)))
+    return found
+
+
+def _clock(key: str, name: str, unit: str, sample: float, room: float, begin: tuple[float, ...]) -> Candidate:
+    """`sample` makes the drive late by one; `room` and where to begin in such, to both sides."""
+    free = (Free(name, unit, -room * sample, room * sample, begin[0] * sample, 0.2 * sample),)
+    starts = tuple({name: side * x * sample} for side in (-1.0, 1.0) for x in begin)
+    return Candidate(key, "clock_skew", free, starts, {name: 0.0})

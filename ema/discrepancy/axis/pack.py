@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ema.core.records import Array
 from ema.models import axis
-from ema.models.axis_layout import row
 
 from .whitening import Filter, join
 from .windows import Bench, Window
@@ -67,9 +66,9 @@ class Pack:
 
     def drive_by(self, model: axis.Model, led_in: LedIn, between: str) -> Array:
         """The drive there, where it has a clock of its own, or is followed with a lag."""
-        clock, lag = model.z[row("clock_skew.currents")], axis.lag_of_drive(model)
+        clock, lag = axis.clock_of_drive(model), axis.lag_of_drive(model)
         if lag == 0.0:
-            return led_in.drive if clock == 0.0 else np.concatenate([w.drive_by(clock, led_in.n) for w in self.windows])
+            return np.concatenate([w.drive_by(clock, led_in.n) for w in self.windows]) if any(clock) else led_in.drive
         acting = self._after_lag(lag, between)
         return np.concatenate([w.drive_by(clock, led_in.n, acting[w.part.number]) for w in self.windows])
 

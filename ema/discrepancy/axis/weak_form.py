@@ -173,7 +173,7 @@ def _moving(plant: Measured, model: axis.Model, j: int, offset: int, zero: float
     speed = np.interp(w.t + late[1], w.t, w.speed)
     raw_w = np.interp(w.t + late[1], w.t, raw_w)
     acting = axis.acting_drive(axis.lag_of_drive(model), w.part.t, w.part.drive, plant.between)
-    drive = (w.drive_by(z[row("clock_skew.currents")], acting=acting) - z[row("drive_offset.offset")]) / (
+    drive = (w.drive_by(axis.clock_of_drive(model), acting=acting) - z[row("drive_offset.offset")]) / (
         1.0 + z[row("drive_gain.gain")]
     )
     i, k_t = _current(b, w, drive, speed, z)

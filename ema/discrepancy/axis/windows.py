@@ -94,16 +94,17 @@ class Window:
         rows = slice(self.begin(n), self.first + self.n)
         return self.part.t[rows], self.part.drive[rows]
 
-    def drive_by(self, clock: float, n: int = 0, acting: Array | None = None) -> Array:
-        """The drive there, where its own interval is off by a share `clock`: straight lines.
+    def drive_by(self, clock: tuple[float, float], n: int = 0, acting: Array | None = None) -> Array:
+        """The drive there, by a clock of its own (`clock_of_drive`): straight lines.
 
         `acting`: what acts of it at the samples of its part, where that is not what was recorded.
         """
         at, own = self.led_in(n)
-        if clock == 0.0:
+        off, late = clock
+        if off == late == 0.0:
             return own if acting is None else acting[self.begin(n) : self.first + self.n]
         t, drive = self.course if acting is None else (self.part.t, acting)
-        return np.interp(at, self.course[0][0] + (t - self.course[0][0]) * (1.0 + clock), drive)
+        return np.interp(at, self.course[0][0] + (t - self.course[0][0]) * (1.0 + off) + late, drive)
 
 
 @dataclass(frozen=True)
