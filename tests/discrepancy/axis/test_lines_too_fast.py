@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ema.discrepancy.axis.balance.course import courses
+from ema.discrepancy.axis.balance.integrated import integrate_rows
 from ema.discrepancy.axis.balance.law import Acting
 from ema.discrepancy.axis.balance.laws import laws
 from ema.discrepancy.axis.balance.motion import Motion
+from ema.discrepancy.axis.balance.of_records import every_law, shown_by
+from ema.discrepancy.axis.balance.widths import half_widths
 
 PERIOD = 1e-3
 SPEED = 50.0  # [rad/s]: order 72 passes at 573 Hz, order 12 at 95
@@ -30,3 +34,17 @@ def test_a_line_that_is_sampled_well_is_as_it_is():
 def test_a_line_faster_than_half_the_rate_has_no_column():
     _, seen = columns(72)
     assert not seen.any()
+
+
+def test_a_line_that_passes_within_a_test_function_is_no_law(support):
+    """What the function leaves of it is the error of the function: no size of such a line is shown."""
+    plant = support("on_paper").plant(support("on_paper").cycle())
+    own = courses(plant)
+    (name,) = half_widths(own)
+    shown = {}
+    for half in (0.004, 0.1):
+        rows = integrate_rows(plant, own, {name: half}, 0.1)
+        shown[half] = {law.key for law in shown_by(rows, every_law(rows, linear=False))}
+    assert {"line 200", "line 12"} <= shown[0.004]
+    assert "line 200" not in shown[0.1]
+    assert "line 12" in shown[0.1]

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ema.core.records import Array
 from ema.models.axis_config import Axis, LinearAxis
 
 from .agreement import INEXACT, agreements
+from .along import LINES
 from .apart import apart
 from .attenuation import attenuation
 from .choice import choose_laws
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
 
 CONSTANT = 0.02  # share by which a voltage must change to drive by more than its value
 APART = 0.05  # of a law's size that must stand out of what inertia, dry friction and drag do
+LEFT = 0.2  # of a line's size, that test functions must leave of it
 N_WIDTHS = 3  # rounds
 MOVED = 2.0  # deviations of the difference between two widths, from which an inertia is another
 TOLD = 1.0 / 3.0  # error of an inertia, as its share, with which the motions show one
@@ -165,10 +168,19 @@ def shown_by(found: Rows, every: Sequence[Law]) -> list[Law]:
             out.append(law)
             continue
         A = np.column_stack(found.of(law, Acting(m.drive, m.drive, m.drive)))
+        if law.family in LINES and _passes_within(found, law, A):
+            continue
         beside = np.linalg.norm(A - q @ (q.T @ A), axis=0)
         if bool((beside > APART * np.linalg.norm(A, axis=0)).any()):
             out.append(law)
     return out
+
+
+def _passes_within(found: Rows, law: Law, columns: Array) -> bool:
+    """Whether a line passes within test functions, which leave little of it: what they leave is their own error."""
+    m = found.motion
+    acts = np.column_stack((law.repeats or law).columns(m, Acting(m.drive, m.drive, m.drive)))
+    return float(np.mean(columns**2)) < LEFT**2 * float(np.mean(acts**2))
 
 
 def given(found: Rows) -> list[Law]:
