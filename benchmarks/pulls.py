@@ -1,7 +1,8 @@
 """How far the comparators' step alone draws a record of the truth towards what a frozen trial told instead of it.
 
 Runs of our own simulation at the hidden values, each by one step, are projected on the way from there to what was told:
-0 is the truth, 1 what was told, whitened by the noise of either. What the hidden record itself does stands beside it.
+0 is the truth, 1 what was told, whitened by the noise of either. What the hidden record itself does stands beside it,
+and what means by each step leave of it: the step that leaves least is the record's own.
 
     python -m benchmarks.pulls benchmarks/trials/frozen-a05912a.jsonl --stratum "beside faults" --number 0
 """
@@ -26,7 +27,7 @@ from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.plant import Point
 
 STEPS = (2.5e-7, 4e-7, 5e-7, 8e-7, 1e-6, 2e-6)  # [s] means of a search are by 0.8 and 1 µs in turn
-MEANS, RUNS = 96, 4
+MEANS, RUNS = 96, 8
 SEED_OF_MEANS, SEED_OF_RUNS = 9_000_000, 77_000_000
 
 
@@ -61,8 +62,10 @@ def main(rows: Path, stratum: str, number: int) -> None:
 
         click.echo(f"noise where {where}: {np.sqrt(square):.0f} deviations apart; the record {share(data.y):+.2f}")
         for s, runs in own.items():
+            left = noise.misfit([noise.of(c).white(data.y[c] - runs[c].features.mean(axis=0)) for c in every], every)
             shares = [share([runs[c].features[j] for c in every]) for j in range(RUNS)]
-            click.echo(f"  our own by {1e6 * s:g} µs: " + " ".join(f"{x:+.2f}" for x in shares))
+            pulls = " ".join(f"{x:+.2f}" for x in shares)
+            click.echo(f"  our own by {1e6 * s:g} µs: {pulls}; its means leave {left:.3f} of the record's noise")
 
 
 if __name__ == "__main__":
