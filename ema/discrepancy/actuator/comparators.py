@@ -1,8 +1,9 @@
 """On which grid the comparators of the record switch: a condition of the bench, not a fault and not an effect.
 
 A hysteresis comparator that is evaluated every Δt switches late by Δt/2 on average, which shifts local means of the
-current by up to a quarter of (slope × Δt), alike in every cycle. No record tells Δt, and none of the nominal steps may
-come near it. So where the nominal ones leave a rest, others are tried on the model as it is.
+current by up to a quarter of (slope × Δt), alike in every cycle. None of the nominal steps may come near it. So where the
+nominal ones leave a rest, others are tried on the model as it is; and near the truth the pattern of the currents tells
+the step, however fine.
 """
 
 from __future__ import annotations
@@ -11,13 +12,15 @@ from collections.abc import Sequence
 
 from ema.discrepancy.plant import Point
 
-from .fit import excess_at
+from .fit import excess_at, misfit_at
 from .noise import Noise
 from .plant import NOISE_STEPS, STEPS, EmaPlant
 
 # [s] roughly: a whole number makes a control period
 TRIED = (2.5e-7, 5e-7, 1e-6, 1.5e-6, 2e-6, 3e-6, 4e-6, 5e-6, 7e-6, 1e-5, 1.4e-5, 2e-5)
 COARSELY = (5e-7, 2e-6, 5e-6, 1.4e-5)  # [s] of these: where none leaves less, none between them does
+FINE = (2.5e-7, 5e-7, 1e-6, 2e-6)  # [s] of those that leave no rest by themselves
+NATS = 10.0  # by which a step has to be likelier than the usual ones
 FELT = 0.05  # difference in misfit; less is chance
 AROUND = (1.0, 1.25, 0.8)  # times the step, for the noise: what is left unknown of it
 CLEAR = 0.7  # share of what is left that another step may leave to be taken instead
@@ -35,6 +38,14 @@ def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]
     left |= {step: excess_at(plant, noise, point, cycles, (step,)) for step in _steps(plant, TRIED) if step not in left}
     best = max(step for step, x in left.items() if x < min(left.values()) + FELT)  # the coarser, the cheaper
     return best if left[best] < min(share * now, now - FELT) else None
+
+
+def tell_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]) -> float | None:
+    """The step with which `point` is likeliest, None where the usual ones do as well. [s]"""
+    now = misfit_at(plant, noise, point, cycles)
+    left = {step: misfit_at(plant, noise, point, cycles, (step,)) for step in _steps(plant, FINE)}
+    best = min(left, key=lambda step: left[step])
+    return best if 0.5 * (now - left[best]) * noise.expected(cycles) > NATS else None
 
 
 def take_step(plant: EmaPlant, step: float | None) -> None:

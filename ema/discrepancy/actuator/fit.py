@@ -108,10 +108,15 @@ def residuals(
     return residuals_at(plant, noise, [point], cycles, n_seeds, seed, steps)[0]
 
 
+def misfit_at(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int], steps: Steps = None) -> float:
+    """What a point leaves of cycles, over what noise makes of them."""
+    left = residuals(plant, noise, point, cycles, plant.n_seeds(cycles, N_SEEDS), SEED, steps)
+    return noise.misfit(list(left.values()), cycles)
+
+
 def excess_at(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int], steps: Steps = None) -> float:
     """What a point leaves of cycles beyond noise, as a misfit."""
-    left = residuals(plant, noise, point, cycles, plant.n_seeds(cycles, N_SEEDS), SEED, steps)
-    return max(noise.misfit(list(left.values()), cycles) - 1.0, 0.0)
+    return max(misfit_at(plant, noise, point, cycles, steps) - 1.0, 0.0)
 
 
 def stacked_jacobian(noise: Noise, frees: Sequence[Free], cols: Columns, cycles: Sequence[int]) -> Array:

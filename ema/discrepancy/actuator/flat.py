@@ -33,6 +33,7 @@ FELT = 60.0  # by how much the whitened features are to differ at either end of 
 N_STEPS = 2.0  # of finite differences, that no parameter is moved beyond
 N_TURNS = 8  # at most
 ARRIVED = 0.25  # share of the way between the ends that a turn may still go along flat directions
+REACH, STRIDE = 120.0, 6.0  # whitened: how far along a flat direction other minima are looked for, in what strides
 N_LAST = 3  # turns there whose mean is taken
 HARDLY = 0.2  # of FELT, by which a bound may bend a way
 UNSEEN = 0.12  # of the noise of a cycle: by how much honest simulations of the same laws differ along a flat direction
@@ -82,6 +83,8 @@ def settle(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> Fi
         step, _ = solve_within_bounds(A * scale, known, *bounds(fit.free, point))
         point = step_to(point, fit.free, step)
         solution = np.linalg.solve(A * scale, rows)
+        if not turn:
+            point = _find_lowest(plant, noise, fit.free, point, J, scale, cycles)
         if (np.abs(ways @ (scale * step)) < ARRIVED * (ways**2).sum(axis=1)).all():
             last.append(point)
         if len(last) == N_LAST:
@@ -94,6 +97,29 @@ def settle(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> Fi
     wandered = np.array([np.std([p[f.name] for p in last]) for f in fit.free])
     more = np.hypot(wandered, _estimate_unseen(noise, A * scale, len(_flat(J, FLAT)[0]), cycles))
     return replace(found, sd={name: float(np.hypot(x, y)) for (name, x), y in zip(found.sd.items(), more, strict=True)})
+
+
+def _find_lowest(
+    plant: EmaPlant, noise: Noise, frees: Sequence[Free], point: Point, J: Array, scale: Array, cycles: Sequence[int]
+) -> Point:
+    """The point along flat directions where least is left once steep ones are fitted.
+
+    What pattern the currents run through changes with every parameter: what is left has minima all along, and the
+    truth's is no wider than that of the others.
+    """
+    U, length, V = np.linalg.svd(J, full_matrices=False)
+    is_flat = length < FLAT * length[0]
+    steep = U[:, ~is_flat]
+    ends = np.arange(STRIDE, REACH + STRIDE, STRIDE)
+    points = [point]
+    for reach, v in zip(1.0 / length[is_flat], V[is_flat], strict=True):
+        low, high = (edge * scale for edge in bounds(frees, point))
+        ways = reach * np.outer(np.concatenate([-ends, ends]), v)
+        over = np.maximum(low - ways, ways - high).max(axis=1)
+        points += [step_to(point, frees, np.clip(way, low, high) / scale) for way in ways[over < HARDLY * FELT]]
+    left = [np.concatenate([x[c] for c in cycles]) for x in residuals_at(plant, noise, points, cycles, N_SEEDS)]
+    beyond = [r - steep @ (steep.T @ r) for r in left]
+    return points[int(np.argmin([float(r @ r) for r in beyond]))]
 
 
 def _estimate_unseen(noise: Noise, A: Array, n_flat: int, cycles: Sequence[int]) -> Array:

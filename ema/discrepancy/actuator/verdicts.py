@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .comparators import CLEAR, PLAIN, find_step, take_step
+from .comparators import CLEAR, PLAIN, find_step, take_step, tell_step
 from .model import CHANCE, DISTANT, Model
 from .noise import N_RUNS_SURE, Noise, Verdict
 from .timing import find_samples_late
@@ -54,8 +54,21 @@ def settle_at_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, 
     """`model` with faults and effects told apart that look nearly the same, as far as the record allows."""
     if not model.effects or model.excess > DISTANT or search.is_settled(model):
         return model, v
-    model, v = _at_the_minimum(search, *begin_again(search, model, v))
+    model, v = _at_the_minimum(search, *begin_again(search, *_by_its_own_step(search, model, v)))
     search.minima.append((model.fit, search.noise))
+    return model, v
+
+
+def _by_its_own_step(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
+    """`model` with the step of the comparators that the record tells near the truth."""
+    step = tell_step(search.plant, search.noise, model.fit.point, search.train) if search.plant.step is None else None
+    if step is None:
+        return model, v
+    take_step(search.plant, step)
+    search.noise = Noise(search.plant, model.fit.point)
+    model = search.model(model.effects, model.fit.free, model.fit.point, None, 2)
+    v = search.verdict(model)
+    search.say(f"comparators every {1e6 * step:g} µs, by the pattern of the currents: p = {v.p_value:.2g}")
     return model, v
 
 
