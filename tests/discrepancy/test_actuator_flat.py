@@ -1,10 +1,11 @@
-"""Sensors that read alike too low beside shorts that are alike: a direction the record hardly feels."""
+"""Sensors that read alike too low, or a weaker magnet, beside shorts that are alike: hardly felt by a record."""
 
 from __future__ import annotations
 
 import pytest
 
 from ema.core.records import Cycle, Record
+from ema.discrepancy.actuator.comparators import take_step, tell_step
 from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.fit import fit
 from ema.discrepancy.actuator.flat import settle
@@ -13,6 +14,7 @@ from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
 
 GAINS = {"gain_a": 0.007, "gain_b": -0.027, "gain_c": -0.014}
+CHANGE = "magnet_flux.change"
 K = {"k3": 0.028, "k5": 0.03}
 OFF = 0.006  # of shorts and gains, against each other
 
@@ -32,3 +34,20 @@ def test_shorts_and_gains_are_told_apart_and_the_intervals_say_how_well(hidden, 
         assert abs(found.point[name] - value) < min(OFF, 2.0 * found.sd[name])  # nearer than it began
     for name, value in K.items():
         assert 2.0 * found.sd[name] < value  # shorts are still told from none
+
+
+@pytest.mark.slow
+def test_a_weaker_magnet_is_found_behind_the_minima_between(hidden, shipped_plant):
+    """What pattern the currents run through changes all along: steps downhill end in a minimum on the way."""
+    flux, k, off = -0.04, {"k1": 0.065, "k3": 0.075, "k4": 0.05, "k5": 0.075}, 0.045
+    bench = hidden.BENCH._replace(substeps=200)
+    cycles = hidden.cycles(hidden.Flaws(flux=flux, **k), 4, 5, bench=bench)
+    data = prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
+    plant = EmaPlant(shipped_plant, data)
+    take_step(plant, tell_step(plant, Noise(plant, k), {**k, CHANGE: flux}, [0, 1]))
+    start = {CHANGE: flux - off, **{name: x - (0.0 if name == "k1" else off) for name, x in k.items()}}
+    noise, every = Noise(plant, start), [0, 1, 2, 3]
+    begun = fit(plant, noise, (*K_FREE, free(CHANGE, 0.03)), start, every, n_iterations=2)
+    found = settle(plant, noise, begun, every)
+    assert abs(begun.point[CHANGE] - flux) > 0.5 * off
+    assert abs(found.point[CHANGE] - flux) < 0.1 * off

@@ -1,9 +1,9 @@
 """On which grid the comparators of the record switch: a condition of the bench, not a fault and not an effect.
 
 A hysteresis comparator that is evaluated every Δt switches late by Δt/2 on average, which shifts local means of the
-current by up to a quarter of (slope × Δt), alike in every cycle. None of the nominal steps may come near it. So where the
-nominal ones leave a rest, others are tried on the model as it is; and near the truth the pattern of the currents tells
-the step, however fine.
+current by up to a quarter of (slope × Δt), alike in every cycle. None of the nominal steps may come near it. So where
+the nominal ones leave a rest, others are tried on the model as it is; and near the truth the pattern of the currents
+tells the step, however fine.
 """
 
 from __future__ import annotations

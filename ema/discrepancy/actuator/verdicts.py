@@ -54,7 +54,7 @@ def settle_at_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, 
     """`model` with faults and effects told apart that look nearly the same, as far as the record allows."""
     if not model.effects or model.excess > DISTANT or search.is_settled(model):
         return model, v
-    model, v = _at_the_minimum(search, *begin_again(search, *_by_its_own_step(search, model, v)))
+    model, v = _at_the_minimum(search, *_by_its_own_step(search, *begin_again(search, model, v)))
     search.minima.append((model.fit, search.noise))
     return model, v
 
