@@ -154,5 +154,5 @@ def _mimicked(plant: Plant, model: Fit) -> tuple[str, ...]:
         mark = np.concatenate([r.ravel() for r in plant.residuals(points, model.blocks)[0]]) - here
         left = mark - slopes @ (slopes.T @ mark)
         if left @ left < MIMICKED * (mark @ mark):
-            out.append(candidate.key)
-    return tuple(out)
+            out.append(candidate.effect)
+    return tuple(dict.fromkeys(out))

@@ -75,6 +75,20 @@ class Toy:
         return {}
 
 
+class Mimicked(Toy):
+    """Two candidates of one effect, each of which the base parameter could be taken for."""
+
+    def candidates(self, point, blocks):
+        free = Free("a.size", "N m", -5.0, 5.0, 0.1, 0.1)
+        return [Candidate(f"a by {way}", "a", (free,), ({"a.size": 0.1},), {"a.size": 0.0}) for way in ("day", "night")]
+
+
+def test_what_the_base_parameters_could_be_taken_for_is_told_by_its_effect_once():
+    plant = Mimicked(3)
+    plant.columns["a"] = plant.columns["k"]
+    assert examine(plant).mimicked == ("a",)
+
+
 def test_of_forty_toys_with_nothing_hidden_none_has_an_effect():
     for seed in range(40):
         outcome = examine(Toy(seed, k=0.3))

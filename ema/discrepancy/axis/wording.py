@@ -153,7 +153,7 @@ def _moved(plant: AxisPlant, outcome: Outcome) -> list[str]:
     unit = "N" if isinstance(plant.plant, LinearAxis) else "N m"
     text = f"dry friction was fitted as {after:.3g} {unit}, the plant file says {before:.3g}"
     if outcome.mimicked:
-        how = dict.fromkeys(registry()[name.split(":")[0]].separated_by for name in outcome.mimicked)
+        how = dict.fromkeys(registry()[name].separated_by for name in outcome.mimicked)
         others = " or ".join(outcome.mimicked)
         text += f"; on these records {others} would look the same, to be told apart by {'; '.join(how)}"
     return [text]
