@@ -9,7 +9,7 @@ import numpy as np
 
 from .comparators import CLEAR, PLAIN, find_step, take_step, tell_step
 from .model import CHANCE, DISTANT, Model
-from .noise import N_RUNS_SURE, Noise, Verdict
+from .noise import N_RUNS, N_RUNS_SURE, Noise, Verdict
 from .timing import find_samples_late
 
 if TYPE_CHECKING:
@@ -42,12 +42,7 @@ def take_bench_conditions(search: Search, model: Model, v: Verdict, share: float
     step = find_step(search.plant, search.noise, model.fit.point, search.train, share)
     if step is None:
         return model, v
-    take_step(search.plant, step)
-    search.noise = Noise(search.plant, model.fit.point, N_RUNS_SURE)
-    model = search.model(model.effects, model.fit.free, model.fit.point, None, 2)
-    v = search.verdict(model)
-    search.say(f"comparators every {1e6 * step:g} µs: p = {v.p_value:.2g}")
-    return model, v
+    return _by_step(search, model, step, N_RUNS_SURE)
 
 
 def settle_at_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
@@ -62,13 +57,16 @@ def settle_at_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, 
 def _by_its_own_step(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
     """`model` with the step of the comparators that the record tells near the truth."""
     step = tell_step(search.plant, search.noise, model.fit.point, search.train) if search.plant.step is None else None
-    if step is None:
-        return model, v
+    return (model, v) if step is None else _by_step(search, model, step, N_RUNS)
+
+
+def _by_step(search: Search, model: Model, step: float, n_runs: tuple[int, int]) -> tuple[Model, Verdict]:
+    """`model` fitted anew with this step of the comparators, by noise of so many runs."""
     take_step(search.plant, step)
-    search.noise = Noise(search.plant, model.fit.point)
+    search.noise = Noise(search.plant, model.fit.point, n_runs)
     model = search.model(model.effects, model.fit.free, model.fit.point, None, 2)
     v = search.verdict(model)
-    search.say(f"comparators every {1e6 * step:g} µs, by the pattern of the currents: p = {v.p_value:.2g}")
+    search.say(f"comparators every {1e6 * step:g} µs: p = {v.p_value:.2g}")
     return model, v
 
 
