@@ -25,7 +25,7 @@ EFFECT = Effect(
             "asymmetry", "1", 0.0, -0.8, 0.8, 0.1, "half difference of friction between the directions over its mean"
         ),
     ),
-    sentence="friction {asymmetry:+.0%} in positive and the opposite in negative direction",
+    sentence="friction differs by direction: {asymmetry} in positive, the opposite in negative",
     separated_by="slow motion in both directions, without load at the user",
     laws={"static_friction": factor, "sliding_friction": factor},
     mistaken_for=("k1",),

@@ -141,6 +141,11 @@ class Effect:
             raise ValueError(f"effect {self.name}: a look at {sorted(strange)}, which are none of its parameters")
 
     @property
+    def multiplies_friction(self) -> bool:
+        """Whether its first parameter is a share of dry friction, which means nothing where there is next to none."""
+        return bool(self.laws) and all(hook.endswith("_friction") for hook in self.laws)
+
+    @property
     def is_table(self) -> bool:
         """Whether it is a tabulated function of no known cause: no single value of it means anything."""
         return "tabulated_torque" in self.laws
@@ -149,9 +154,17 @@ class Effect:
         """Values that switch the effect off."""
         return {p.name: p.neutral for p in self.parameters}
 
-    def said(self, values: Mapping[str, float]) -> str:
-        """The sentence with these values; parameters that are not among them are neutral."""
+    def said(self, values: Mapping[str, float], friction: float | None = None) -> str:
+        """The sentence with these values; parameters that are not among them are neutral.
+
+        A share of dry friction is told as the torque that it makes of `friction` [N m], or in per cent where that is
+        not given.
+        """
         neutral = self.neutral()
         full = {**neutral, **values}
         besides = [text for name, text in self.besides.items() if full[name] != neutral[name]]
-        return (self.sentence + " and".join(besides)).format(**full)
+        told: dict[str, float | str] = {**full}
+        if self.multiplies_friction:
+            name = self.parameters[0].name
+            told[name] = f"{100.0 * full[name]:.3g}%" if friction is None else f"{full[name] * friction:.3g} N m"
+        return (self.sentence + " and".join(besides)).format(**told)

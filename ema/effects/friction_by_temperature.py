@@ -16,7 +16,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("per_kelvin", "1/K", 0.0, -0.1, 0.1, 0.01, "share of dry friction lost per kelvin above 20 °C"),
     ),
-    sentence="dry friction falls by {per_kelvin:.2%} per kelvin of the recorded temperature",
+    sentence="dry friction falls by {per_kelvin} per kelvin of the recorded temperature",
     separated_by="the same motion cold and warm, and once more after the axis has cooled down",
     laws={"drifting_friction": factor},
     mistaken_for=("k1",),

@@ -16,7 +16,7 @@ EFFECT = Effect(
         Parameter("rate", "1/s", 0.0, -10.0, 10.0, -0.05, "growth of dry friction with time, over nominal friction"),
         Parameter("since", "s", 0.0, -1e6, 1e6, 0.0, "time of a cycle at which friction is the plant file's"),
     ),
-    sentence="dry friction drifts within a cycle by {rate:+.3g} of nominal per second",
+    sentence="dry friction drifts within a cycle by {rate} per second",
     separated_by="the same motion cold and warm, with a temperature recorded",
     laws={"drifting_friction": factor},
     mistaken_for=("k1",),

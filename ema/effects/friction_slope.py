@@ -16,7 +16,7 @@ EFFECT = Effect(
         Parameter("slope", "1/rad", 0.0, -1e3, 1e3, 0.01, "growth of friction with the angle, over nominal friction"),
         Parameter("centre", "rad", 0.0, -1e4, 1e4, 0.0, "angle at which friction is the plant file's"),
     ),
-    sentence="dry friction changes along the travel by {slope:+.3g} of nominal per rad",
+    sentence="dry friction changes along the travel by {slope} per rad",
     separated_by="slow motion over the whole travel",
     laws={"static_friction": factor, "sliding_friction": factor},
     mistaken_for=("k1",),

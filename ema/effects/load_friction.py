@@ -25,7 +25,7 @@ EFFECT = Effect(
             "per_torque", "1/(N m)", 0.0, 0.0, 20.0, 1.0, "growth of friction per motor torque, over nominal friction"
         ),
     ),
-    sentence="friction grows with the torque passed on, by {per_torque:.3g} of nominal per N m",
+    sentence="friction grows with the torque passed on, by {per_torque} per N m",
     separated_by="motions with different accelerations or loads at the same speed",
     laws={"static_friction": factor, "sliding_friction": factor},
     mistaken_for=("k1",),

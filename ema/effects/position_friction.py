@@ -19,7 +19,7 @@ EFFECT = Effect(
         Parameter("centre", "rad", 0.0, -0.4, 0.4, 0.0, "user position of the stretch"),
         Parameter("width", "rad", 0.001, 0.0001, 0.01, 0.001, "half width, to 1/e of the height"),
     ),
-    sentence="friction changed by {height:+.0%} around θ_u = {centre:.2g} rad, half width {width:.2g} rad",
+    sentence="friction changed by {height} around θ_u = {centre:.2g} rad, half width {width:.2g} rad",
     separated_by="slow motion over the whole travel",
     laws={"static_friction": factor, "sliding_friction": factor},
     mistaken_for=("k1",),

@@ -18,7 +18,7 @@ EFFECT = Effect(
             "growth of friction per motor torque squared, over nominal friction",
         ),
     ),
-    sentence="friction grows with the square of the torque passed on, by {per_square:.3g} of nominal per (N m)²",
+    sentence="friction grows with the square of the torque passed on, by {per_square} per (N m)²",
     separated_by="motions with different accelerations or loads at the same speed",
     laws={"static_friction": factor, "sliding_friction": factor},
     mistaken_for=("k1",),

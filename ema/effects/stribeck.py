@@ -22,7 +22,7 @@ EFFECT = Effect(
         Parameter("speed", "rad/s", 10.0, 0.5, 80.0, 10.0, "speed over which the excess fades by 1/e"),
         Parameter("shape", "1", 0.0, 0.0, 1.2, 0.5, "how it fades: 0 exponentially, 1 as a Gaussian"),
     ),
-    sentence="Stribeck friction: sliding friction {excess:.0%} higher at low speed, fading over {speed:.3g} rad/s",
+    sentence="Stribeck friction: sliding friction {excess} higher at low speed, fading over {speed:.3g} rad/s",
     separated_by="slow motion at several constant speeds",
     laws={"sliding_friction": factor},
     mistaken_for=("k1",),

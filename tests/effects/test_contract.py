@@ -41,7 +41,7 @@ def test_declaration(effect):
     assert set(effect.plants) <= {"ema", "axis"}
     effect.sentence.format(**effect.neutral())
     assert set(effect.besides) <= set(effect.neutral())
-    assert effect.said({}) == effect.sentence.format(**effect.neutral())
+    assert effect.said({}) == effect.said(effect.neutral())
     assert "{" not in effect.said({p.name: p.start for p in effect.parameters})
     assert effect.separated_by
     assert set(effect.limits) <= set(effect.neutral())
@@ -55,6 +55,20 @@ def test_declaration(effect):
     for hook, law in effect.laws.items():
         n_arguments = HOOKS[hook][1] + len(effect.parameters)
         assert len(inspect.signature(law).parameters) == n_arguments
+
+
+def test_a_share_of_friction_is_told_as_a_torque_where_friction_is_known():
+    """A thousand times next to no friction is 41 N m: per cent of it say nothing."""
+    effect, values = registry()["stribeck"], {"excess": 1003.41, "speed": 2.0}
+    assert "41.1 N m higher" in effect.said(values, 0.041)
+    assert "67% higher" in effect.said({**values, "excess": 0.67})
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if e.multiplies_friction], ids=lambda e: e.name)
+def test_what_multiplies_friction_is_a_share_of_it_by_its_first_parameter(effect):
+    values = {p.name: p.start for p in effect.parameters}
+    assert "%" in effect.said(values)
+    assert f"{values[effect.parameters[0].name] * 0.03:.3g} N m" in effect.said(values, 0.03)
 
 
 def test_only_what_is_not_neutral_is_said():

@@ -48,7 +48,7 @@ def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Se
             entry = {
                 "key": candidate.key,
                 "name": effect.name,
-                "sentence": said(effect.said(values)),
+                "sentence": said(effect.said(values, own.parameters.get("F_d", plant.plant.F_d))),
                 "separated_by": said(effect.separated_by),
                 "mistaken_for": list(effect.mistaken_for),
                 "parameters": parameters,

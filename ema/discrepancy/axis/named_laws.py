@@ -13,7 +13,7 @@ from ema.discrepancy.grade import NAMED
 from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
-from .balance.as_effects import effects
+from .balance.as_effects import effects, friction
 from .balance.found import Balance, Term, draw
 from .balance.telling_records import INTERVAL
 from .linear import of_axis
@@ -57,5 +57,5 @@ def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.Found
     others = term.others
     confidence = round(b.of_set(term) / (1 + len(others)), 4)  # those in a set share what is sure of it
     return shared.FoundEffect(
-        name, confidence, others, parameters, said(effect.said(values)) + ALONE, said(effect.separated_by)
+        name, confidence, others, parameters, said(effect.said(values, friction(b))) + ALONE, said(effect.separated_by)
     )  # fmt: skip
