@@ -54,11 +54,6 @@ class Fit:
     scale: float
     by_noise: Array
 
-    @property
-    def loss(self) -> float:
-        """Minus the log-likelihood at the fit's own scale."""
-        return float(sum(-s.sum() for s in log_likelihood(self.residuals, self.scale)))
-
     def draw(self, n: int, seed: int = 0) -> list[Point]:
         """Points drawn from the fit's uncertainty, clipped to the bounds."""
         rng = np.random.default_rng(seed)
@@ -87,6 +82,12 @@ def log_likelihood(residuals: Sequence[Array], scale: float) -> list[Array]:
         v = np.minimum(u, HUBER)
         out.append(-(v * (u - 0.5 * v)).sum(axis=0))  # u²/2, from HUBER on along the tangent
     return out
+
+
+def rate(runs: Sequence[Sequence[Array]]) -> list[float]:
+    """Log-likelihood of several residuals of the same blocks, all at the smallest of their scales."""
+    scale = min(scale_of(r) for r in runs)
+    return [float(sum(s.sum() for s in log_likelihood(r, scale))) for r in runs]
 
 
 def _flat(residuals: Sequence[Array]) -> Array:
@@ -247,10 +248,6 @@ def best_fit(
     """The best of fits from several starts: all are rated by one simulation each, the most promising are fitted."""
     n_fits = 1 if len(starts) <= 2 else (2 if len(starts) <= 8 else 3)
     if len(starts) > 1:
-        runs = plant.residuals(starts, blocks)
-        scale = min(scale_of(r) for r in runs)
-        rating = [sum(s.sum() for s in log_likelihood(r, scale)) for r in runs]
-        starts = [starts[j] for j in np.argsort(rating)[::-1][:n_fits]]
+        starts = [starts[j] for j in np.argsort(rate(plant.residuals(starts, blocks)))[::-1][:n_fits]]
     fits = [fit(plant, free, s, blocks, max_iterations=max_iterations, frozen=frozen) for s in starts]
-    scale = min(f.scale for f in fits)
-    return max(fits, key=lambda f: sum(s.sum() for s in log_likelihood(f.residuals, scale)))
+    return fits[0] if len(fits) == 1 else fits[int(np.argmax(rate([f.residuals for f in fits])))]

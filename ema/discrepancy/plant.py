@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from ema.core.records import Array
@@ -50,15 +50,12 @@ class Candidate:
         Parameters to fit; their names are global.
     starts : tuple of Points
         Where searches begin; the best one counts. Also holds values that stay fixed during the fit.
-    neutral : Point
-        Values that switch it off.
     """
 
     key: str
     effect: str
     free: tuple[Free, ...]
     starts: tuple[Point, ...]
-    neutral: Point = field(default_factory=dict)
     is_structure: bool = False
 
 
@@ -70,9 +67,7 @@ class Block:
     be used to check what was fitted on another.
     """
 
-    label: str
     group: str
-    n: int
     stretch: int = 0
 
 

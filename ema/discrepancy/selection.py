@@ -9,7 +9,7 @@ import numpy as np
 
 from ema.core.records import Array
 
-from .fitting import Fit, best_fit, fit, jacobian, log_likelihood, scale_of
+from .fitting import Fit, best_fit, fit, jacobian, log_likelihood, rate, scale_of
 from .plant import Block, Candidate, Plant, Point
 
 N_FOLDS = 2
@@ -127,8 +127,7 @@ def _help_by_other_folds(plant: Plant, own: Fit, fits: Sequence[Fit]) -> Fit:
         if other is own or [f.name for f in other.free] != names or not names:
             continue
         residuals = plant.residuals([other.point], own.blocks)[0]
-        scale = min(own.scale, scale_of(residuals))
-        here, there = (sum(float(s.sum()) for s in log_likelihood(r, scale)) for r in (own.residuals, residuals))
+        here, there = rate([own.residuals, residuals])
         if there > here + 1.0:
             own = fit(plant, own.free, other.point, own.blocks)
     return own

@@ -48,18 +48,18 @@ def scale_test(residuals: Sequence[Array], group: int, noise_uncertainty: float,
     return float(stats.chi2.sf(total, count))
 
 
-def correlation_test(residuals: Sequence[Array], n_lags: int = N_LAGS) -> float:
+def correlation_test(residuals: Sequence[Array]) -> float:
     """P-value of neighbouring residuals being uncorrelated (Ljung and Box over blocks and channels)."""
     n_channels = max((len(block) for block in residuals), default=0)
     statistic, used = 0.0, 0
     for channel in range(n_channels):
         parts = [np.clip(block[channel], -CLIP, CLIP) for block in residuals if channel < len(block)]
-        parts = [x for x in parts if len(x) > 4 * n_lags]
+        parts = [x for x in parts if len(x) > 4 * N_LAGS]
         power = sum(float(x @ x) for x in parts)
         n = sum(len(x) for x in parts)
         if not parts or power == 0.0:
             continue
-        for lag in range(1, n_lags + 1):
+        for lag in range(1, N_LAGS + 1):
             rho = sum(float(x[lag:] @ x[:-lag]) for x in parts) / power
             statistic += n * rho**2
             used += 1

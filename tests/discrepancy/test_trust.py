@@ -44,7 +44,7 @@ class Columns:
     structure = candidates = errors = describe = describe_structure = None
 
     def __init__(self, columns, acting):
-        self.blocks = [Block(str(j), "record", N, stretch=j) for j in range(N_BLOCKS)]
+        self.blocks = [Block("record", stretch=j) for j in range(N_BLOCKS)]
         self.columns = columns
         self.y = np.random.default_rng(1).standard_normal((N_BLOCKS, N)) + acting
 

@@ -67,7 +67,7 @@ def structure(cycles: Sequence[Torque], rate: float, scores: dict[str, float]) -
     """
     orders = [
         {"order": order, "amplitude": float(np.hypot(*share_explained(cycles, line(order))[1])), "share": share}
-        for order, share in lines(cycles, 2)
+        for order, share in lines(cycles)
     ]
     tones = np.array([_share_by_cycle(cycles, _tone(f, rate)) for f in FREQUENCIES])
     peak = int(np.argmax(tones))

@@ -17,6 +17,7 @@ from ema.core.records import Array
 from .features import GROUPS, SETTLING, Signals, local_mean, spacing
 
 ORDERS = np.arange(1.0, 120.0, 0.1)
+N_LINES = N_STRETCHES = 2  # that are proposed
 MOVING = 2.0  # [rad/s] below, dry friction takes up what it likes
 
 
@@ -87,20 +88,20 @@ def bump(centre: float, width: float) -> Callable[[Torque], Array]:
     return lambda c: -(np.sign(c.w_m) * np.exp(-(((c.theta_u - centre) / width) ** 2)))[None]
 
 
-def lines(cycles: Sequence[Torque], n: int = 2, orders: Array = ORDERS) -> list[tuple[float, float]]:
-    """The `n` strongest torque lines: order, share explained; peaks are at least 0.7 orders apart."""
-    shares = np.array([share_explained(cycles, line(order))[0] for order in orders])
+def lines(cycles: Sequence[Torque]) -> list[tuple[float, float]]:
+    """The `N_LINES` strongest torque lines: order, share explained; peaks are at least 0.7 orders apart."""
+    shares = np.array([share_explained(cycles, line(order))[0] for order in ORDERS])
     found: list[tuple[float, float]] = []
     for j in np.argsort(shares)[::-1]:
-        if all(abs(orders[j] - order) >= 0.7 for order, _ in found):
-            found.append((float(orders[j]), float(shares[j])))
-        if len(found) == n:
+        if all(abs(ORDERS[j] - order) >= 0.7 for order, _ in found):
+            found.append((float(ORDERS[j]), float(shares[j])))
+        if len(found) == N_LINES:
             break
     return found
 
 
-def bumps(cycles: Sequence[Torque], n: int = 2) -> list[tuple[float, float]]:
-    """The `n` likeliest stretches of changed friction: centre and width. [rad]"""
+def bumps(cycles: Sequence[Torque]) -> list[tuple[float, float]]:
+    """The `N_STRETCHES` likeliest stretches of changed friction: centre and width. [rad]"""
     low, high = min(c.theta_u.min() for c in cycles), max(c.theta_u.max() for c in cycles)
     grid = [(c, w) for c in np.linspace(low, high, 31) for w in (5e-4, 1e-3, 2e-3, 4e-3)]
     shares = [share_explained(cycles, bump(c, w))[0] for c, w in grid]
@@ -108,6 +109,6 @@ def bumps(cycles: Sequence[Torque], n: int = 2) -> list[tuple[float, float]]:
     found = [grid[int(order[0])]]
     for j in order:
         c, w = grid[int(j)]
-        if len(found) < n and all(abs(c - other) > max(w, width) for other, width in found):
+        if len(found) < N_STRETCHES and all(abs(c - other) > max(w, width) for other, width in found):
             found.append((c, w))
     return [(float(c), float(w)) for c, w in found]

@@ -21,6 +21,7 @@
 `predictable`   how long windows may be
 `fading`        the search for the speed over which friction falls
 `linear`        metres and newtons in what is said
+`interval`      intervals of 95 % of what was drawn
 `between`       what the drive does between samples
 `named_laws`    laws of the balance as effects of the library
 `agreeing`      free runs and the balance together: what both name

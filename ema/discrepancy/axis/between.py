@@ -20,8 +20,8 @@ from ema.discrepancy.fitting import fit
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Free, Point
 from ema.discrepancy.progress import Progress
+from ema.discrepancy.rounds import judge_model
 from ema.discrepancy.selection import ODDS, Tried, above_noise, compare, fit_base, refit
-from ema.discrepancy.verdict import judge
 
 from .plant import AxisPlant
 
@@ -158,8 +158,7 @@ def _sorted(effects: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _of_plain(plant: AxisPlant) -> str:
     """The way that leaves clearly least of what no effect explains, or straight."""
     straight = _plain(plant, "straight")
-    n_free = sum(len(f.free) for f in straight.fits)
-    if judge(straight.held_out, noise_uncertainty=plant.noise_uncertainty, n_free=n_free).is_noise:
+    if judge_model(plant, straight).is_noise:
         return "straight"
     tried = {way: straight if way == "straight" else _plain(plant, way) for way in _ways(plant)}
     best = min(tried, key=lambda way: tried[way].rms)

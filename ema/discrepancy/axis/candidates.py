@@ -68,7 +68,6 @@ def _candidate(plant: Measured, s: AxisSizes, name: str, point: Point) -> Candid
     if spec is None:
         return None
     units = {p.name: p.unit for p in effect.parameters}
-    nominal = {**effect.neutral(), **plant.plant.effects.get(name, {})}
     free = tuple(
         Free(f"{name}.{parameter}", units[parameter], low, high, start[0], scale, is_shape=parameter in SHAPES)
         for parameter, (low, high, start, scale) in spec.items()
@@ -76,8 +75,7 @@ def _candidate(plant: Measured, s: AxisSizes, name: str, point: Point) -> Candid
     grid: list[dict[str, float]] = [{}]
     for parameter, (_, _, starts, _) in spec.items():
         grid = [{**point_, f"{name}.{parameter}": value} for point_ in grid for value in starts]
-    neutral = {f.name: nominal[f.name.removeprefix(f"{name}.")] for f in free[:1]}
-    return Candidate(name, name, free, tuple(grid), neutral)
+    return Candidate(name, name, free, tuple(grid))
 
 
 def _clocks_of_the_drive(plant: Measured, s: AxisSizes, point: Point) -> list[Candidate]:
@@ -99,4 +97,4 @@ def _clock(key: str, name: str, unit: str, sample: float, room: float, begin: tu
     """`sample` makes the drive late by one; `room` and where to begin in such, to both sides."""
     free = (Free(name, unit, -room * sample, room * sample, begin[0] * sample, 0.2 * sample),)
     starts = tuple({name: side * x * sample} for side in (-1.0, 1.0) for x in begin)
-    return Candidate(key, "clock_skew", free, starts, {name: 0.0})
+    return Candidate(key, "clock_skew", free, starts)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import correlate, savgol_filter
 
 from ema.core.errors import RecordError
@@ -145,7 +146,7 @@ def _not_clipped(record: Record, names: tuple[str, ...], position: str) -> None:
             continue
         for limit in (limit for limit in (x.max(), x.min()) if limit != 0.0):  # at zero it rests
             share = float(np.mean(x == limit))
-            longest = _longest_run(x == limit)
+            longest = int(np.diff(find_runs(x == limit)).max())
             if share > 0.03 and longest >= 5 and (name != position or is_cut_off(x, limit)):
                 raise RecordError(
                     f"{record.name}: {name} is clipped at {limit:g} {CHANNELS[name].unit} "
@@ -164,6 +165,6 @@ def is_cut_off(x: Array, limit: float) -> bool:
     return bool(arrivals.size) and float(np.median(moves[arrivals])) > typical
 
 
-def _longest_run(flags: np.ndarray) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(int), [0]))))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))
+def find_runs(flags: NDArray[np.bool_]) -> NDArray[np.int_]:
+    """First and one past the last sample of each run of what is true, shape (n_runs, 2)."""
+    return np.flatnonzero(np.diff(flags.astype(int), prepend=0, append=0)).reshape(-1, 2)

@@ -36,7 +36,7 @@ class Scan:
     inertia: float = 0.0
 
 
-def scan(weak: Weak, orders: Array, max_lines: int = MAX_LINES, alarm: float = ALARM) -> Scan:
+def scan(weak: Weak, orders: Array, max_lines: int = MAX_LINES) -> Scan:
     """Forward orthogonal selection of angle-locked lines beside friction, viscous drag, inertia and a constant."""
     y = weak.y / weak.sigma
     m = weak.motion
@@ -58,7 +58,7 @@ def scan(weak: Weak, orders: Array, max_lines: int = MAX_LINES, alarm: float = A
         total = float(rest @ rest)
         f = (gain[best] / 2.0) / max((total - gain[best]) / max(len(y) - basis.shape[1] - 2, 1), 1e-300)
         p = stats.f.sf(f * n_effective / len(y), 2, n_effective) * int(resolvable.sum())
-        if p > alarm or gain[best] < 0.005 * total:
+        if p > ALARM or gain[best] < 0.005 * total:
             break
         chosen.append(best)
         basis = _orthonormal(np.concatenate([A, *lines[chosen]], axis=1))
@@ -116,4 +116,4 @@ def cogging_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> C
     if "J" in plant.plant.fitted:
         J = next(f for f in plant.base if f.name == "J")
         starts.append({**start, "J": min(max(float(point["J"]) + found.inertia, J.low), J.high)})
-    return Candidate("cogging", "cogging", tuple(free), tuple(starts), dict.fromkeys(start, 0.0))
+    return Candidate("cogging", "cogging", tuple(free), tuple(starts))

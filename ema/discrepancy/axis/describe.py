@@ -11,8 +11,8 @@ from ema.discrepancy.plant import Candidate, Point
 from ema.effects import registry
 from ema.models.axis_config import LinearAxis
 
-from .balance.telling_records import INTERVAL
 from .cogging import MIN_LINE
+from .interval import interval
 from .linear import by_drive, of_axis
 from .naming import numbers_of
 
@@ -40,11 +40,9 @@ def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Se
             unit = {p.name: said(p.unit) for p in effect.parameters}
             parameters = {}
             for name, value in values.items():
-                spread = np.array([s.effects[key][name] for s in samples if key in s.effects])
-                if name == "phase" and spread.size:
-                    spread = value + np.angle(np.exp(1j * (spread - value)))
-                low, high = np.percentile(spread, INTERVAL) if spread.size else (value, value)
-                parameters[name] = {"value": value, "low": float(low), "high": float(high), "unit": unit[name]}
+                spread = [s.effects[key][name] for s in samples if key in s.effects]
+                low, high = interval(name, value, spread or [value])
+                parameters[name] = {"value": value, "low": low, "high": high, "unit": unit[name]}
             entry = {
                 "key": candidate.key,
                 "name": effect.name,

@@ -102,4 +102,4 @@ def fading_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Sequen
         Free(f"{NAME}.{name}", units[name], low, high, starts[0][f"{NAME}.{name}"], scale)
         for name, (low, high, scale) in bounds.items()
     )
-    return Candidate(NAME, NAME, free, tuple(starts), {f"{NAME}.excess": 0.0})
+    return Candidate(NAME, NAME, free, tuple(starts))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ema.discrepancy.fitting import log_likelihood, scale_of
+from ema.discrepancy.fitting import rate
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 
@@ -47,8 +47,7 @@ def gear_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Cand
         for beyond in (RUBS[side] if F > 0.0 else (0.0,))
     ]
     runs = plant.residuals([{**point, **start} for start in starts], moving)
-    scale = min(scale_of(r) for r in runs)
-    best = starts[int(np.argmax([sum(s.sum() for s in log_likelihood(r, scale)) for r in runs]))]
+    best = starts[int(np.argmax(rate(runs)))]
     units = {p.name: p.unit for p in registry()[effect].parameters}
     c, J_b = best[f"{effect}.compliance"], best[f"{effect}.inertia"]
     free = (
@@ -57,7 +56,7 @@ def gear_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Cand
         Free(f"{effect}.damping", units["damping"], 0.0, 1.0, DAMPING, 0.02),
         *([Free(f"{effect}.friction", units["friction"], 0.0, 2.0 * F, 0.0, 0.05 * F)] if F > 0.0 else []),
     )
-    return Candidate(effect, effect, free, (best,), {f"{effect}.compliance": 0.0})
+    return Candidate(effect, effect, free, (best,))
 
 
 def _start(effect: str, J_b: float, c: float, F_b: float, F: float) -> dict[str, float]:

@@ -20,6 +20,7 @@ from ema.core.records import Array, Cycle, Record
 from ema.models.axis_config import Axis, LinearAxis, PositionLoop
 
 from .balance.smooth import local_polynomial
+from .channels import find_runs
 
 GIVEN = {"current": "i_q", "voltage": "u_q", "torque": "torque", "force": "force", "duty": "duty"}
 SHORTEST = 40  # samples of a part with the drive on
@@ -83,6 +84,5 @@ def _enabled(plant: Axis, cycle: Cycle, drive: str) -> list[Cycle]:
     on = cycle["enabled"] > 0.5
     if drive != "u_q":
         return [replace(cycle, channels={**cycle.channels, drive: np.where(on, cycle[drive], 0.0)})]
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], on.astype(int), [0])))).reshape(-1, 2)
-    parts = [cycle.rows(int(a), int(b)) for a, b in edges if b - a >= SHORTEST]
+    parts = [cycle.rows(a, b) for a, b in find_runs(on).tolist() if b - a >= SHORTEST]
     return [replace(part, number=100 * cycle.number + k) for k, part in enumerate(parts)] if len(parts) > 1 else parts

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ema.discrepancy import findings as shared
 from ema.discrepancy.grade import NAMED
 from ema.effects import registry
@@ -15,7 +13,7 @@ from ema.models.axis_config import LinearAxis
 
 from .balance.as_effects import effects, friction
 from .balance.found import Balance, Term, draw
-from .balance.telling_records import INTERVAL
+from .interval import interval
 from .linear import of_axis
 
 if TYPE_CHECKING:
@@ -47,13 +45,10 @@ def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.Found
     values = effects(b, term)[name]
     samples = [effects(b, term, c)[name] for c in draw(b)]
     units = {p.name: said(p.unit) for p in effect.parameters}
-    parameters = {}
-    for key, value in values.items():
-        spread = np.array([s[key] for s in samples])
-        if key == "phase":
-            spread = value + np.angle(np.exp(1j * (spread - value)))
-        low, high = np.percentile(spread, INTERVAL)
-        parameters[key] = shared.Quantity(value, float(low), float(high), units[key])
+    parameters = {
+        key: shared.Quantity(value, *interval(key, value, [s[key] for s in samples]), units[key])
+        for key, value in values.items()
+    }
     others = term.others
     confidence = round(b.of_set(term) / (1 + len(others)), 4)  # those in a set share what is sure of it
     return shared.FoundEffect(

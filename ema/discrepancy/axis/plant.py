@@ -98,7 +98,7 @@ class AxisPlant:
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
         """The windows."""
-        return tuple(Block(w.label, w.group, w.n, w.stretch) for w in self.windows)
+        return tuple(Block(w.group, w.stretch) for w in self.windows)
 
     @property
     def noise_uncertainty(self) -> float:

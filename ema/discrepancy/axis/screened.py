@@ -86,7 +86,7 @@ def begin_at(name: str, values: dict[str, float], unsure: dict[str, float]) -> C
 def _line(name: str, values: dict[str, float]) -> Candidate:
     start, A = line_point(name, values), values["amplitude"]
     free = tuple(Free(key, "N m", -ROOM * A, ROOM * A, value, 0.1 * A, 1e-3 * A) for key, value in start.items())
-    return Candidate(f"{name}:{values['order']:.5g}", name, free, (start,), dict.fromkeys(start, 0.0))
+    return Candidate(f"{name}:{values['order']:.5g}", name, free, (start,))
 
 
 def _candidate(name: str, values: dict[str, float], unsure: dict[str, float]) -> Candidate:
@@ -107,4 +107,4 @@ def _candidate(name: str, values: dict[str, float], unsure: dict[str, float]) ->
             prior = PRIOR * size if key in VAGUE else None
             free.append(Free(key, p.unit, low, ROOM * size, value, 0.1 * size, prior=prior))
     start = {f"{name}.{key}": value for key, value in values.items()}
-    return Candidate(name, name, tuple(free), (start,), {free[0].name: effect.neutral()[effect.parameters[0].name]})
+    return Candidate(name, name, tuple(free), (start,))

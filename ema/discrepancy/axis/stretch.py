@@ -61,4 +61,4 @@ def stretch_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Seque
         Free(f"{NAME}.centre", units["centre"], low, high, first[f"{NAME}.centre"], 0.2 * w),
         Free(f"{NAME}.width", units["width"], 0.3 * float(WIDTHS[0]) * h, h, w, 0.2 * w),
     )
-    return Candidate(NAME, NAME, free, tuple(start for _, start in starts), {f"{NAME}.height": 0.0})
+    return Candidate(NAME, NAME, free, tuple(start for _, start in starts))

@@ -180,5 +180,4 @@ def _candidate(key: str, term: Term, c: Array, plant: Measured) -> Candidate:
         start[f"{key}.coefficient"] = float(c[0])
     for name, (low, high, scale) in term.refine.items():
         free.append(Free(f"{key}.{name}", "", low, high, 0.0, scale, 0.02 * scale))
-    neutral = {f"{key}.coefficient": 0.0}
-    return Candidate(term.family, term.family, tuple(free), (start,), neutral, is_structure=True)
+    return Candidate(term.family, term.family, tuple(free), (start,), is_structure=True)

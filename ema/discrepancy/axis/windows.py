@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from ema.core.errors import RecordError
@@ -14,7 +15,7 @@ from ema.core.records import Array, Cycle, Record
 from ema.effects.base import T_REFERENCE
 from ema.models.axis_config import Axis
 
-from .channels import MIN_SAMPLES, Roles, roles
+from .channels import MIN_SAMPLES, Roles, find_runs, roles
 from .noise import ESTIMATE_UNCERTAINTY, SIMULATED_TO, Noise, estimate, is_derived
 
 HALF = 5  # samples on each side of a local quadratic
@@ -167,7 +168,7 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
         smooth = _smooth(raw, gaps, width)
     speed = _smooth(cycle[who.speed], gaps, width) if who.speed is not None else _smooth(raw, gaps, 2 * width - 1, dt)
     if who.position is None:
-        raw = smooth = np.concatenate(([0.0], np.cumsum(np.diff(t) * 0.5 * (speed[1:] + speed[:-1]))))
+        raw = smooth = cumulative_trapezoid(speed, t, initial=0.0)
     warmer = cycle["temp_w"] - T_REFERENCE if "temp_w" in cycle else np.zeros(n)
     cuts = _glitches(cycle, who, noise) if who.position is not None and who.speed is not None else np.array([], int)
     still = np.abs(speed) < AT_REST * START_NOISE * speed_noise(who, noise, dt)
@@ -256,8 +257,8 @@ def _rests(still: NDArray[np.bool_], margin: int) -> NDArray[np.int_]:
     A window ends where the axis comes to rest and the next begins when it moves: when it breaks away depends on a
     torque of which the record has noisy samples, and what follows a breakaway at another moment is no noise.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(int), [0])))).reshape(-1, 2)
-    rests = edges[edges[:, 1] - edges[:, 0] >= SHORTEST_REST]
+    runs = find_runs(still)
+    rests = runs[runs[:, 1] - runs[:, 0] >= SHORTEST_REST]
     return np.clip(rests + np.array([-margin, margin]), 0, len(still))
 
 

@@ -142,8 +142,6 @@ class Prediction:
         Squared rest of the record about the predicted mean, less what the mean's own noise makes of it.
     rest_mean, rest_variance : float
         Of records of the hypothesis itself.
-    n_records : int
-        How many these were.
     """
 
     mean: Array
@@ -151,7 +149,6 @@ class Prediction:
     rest: float
     rest_mean: float
     rest_variance: float
-    n_records: int
 
     @classmethod
     def of(cls, statistic: Statistic, records: Simulated, measured: Array) -> Prediction:
@@ -165,7 +162,7 @@ class Prediction:
         rest_mean = unbiased * float(own.mean())
         left = max(float(rest) - rest_mean / n, 1e-9)
         rest_variance = unbiased**2 * float(own.var(ddof=1))
-        return cls(mean, _covariance(statistic, records), left, rest_mean, rest_variance, n)
+        return cls(mean, _covariance(statistic, records), left, rest_mean, rest_variance)
 
     def log_rest(self, law_error: float) -> float:
         """Log density of the rest: a gamma as wide as the records', stretched by what a law may leave of it.

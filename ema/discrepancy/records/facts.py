@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ema.core.names import CHANNELS
 from ema.core.records import Array, Record
-from ema.discrepancy.axis.channels import is_cut_off
+from ema.discrepancy.axis.channels import find_runs, is_cut_off
 from ema.discrepancy.axis.noise import estimate, quantum
 
 LONG = 1.5  # a step of time longer than so many median steps is a gap
@@ -127,20 +126,14 @@ def _held(parts: list[Array], ends: tuple[float, ...], step: float) -> float:
     n = 0
     for part in parts:
         for end in ends:
-            runs, beside = _runs(part == end), _runs(np.abs(part - end) < 1.5 * step)
+            runs, beside = (find_runs(flags).tolist() for flags in (part == end, np.abs(part - end) < 1.5 * step))
             inner = [(first, last) for first, last in runs if first > 0 and last < len(part) and last - first >= HELD]
             n += sum(last - first for first, last in inner if not _is_peak(first, last, beside))
     share = n / sum(len(part) for part in parts)
     return share if share > ENDS else 0.0
 
 
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and one past the last sample of each run of what is true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
-    return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _is_peak(first: int, last: int, beside: list[tuple[int, int]]) -> bool:
+def _is_peak(first: int, last: int, beside: list[list[int]]) -> bool:
     """Whether the run is the top of a smooth turn in steps: it is as slow on the next step as a parabola is there."""
     around = max((b - a for a, b in beside if a <= first and last <= b), default=0) - (last - first)
     return around * PARABOLA >= last - first

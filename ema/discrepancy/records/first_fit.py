@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import block_diag
 
 from ema.core.records import Array, Cycle, Record
@@ -102,7 +103,7 @@ def _weak(record: Record, position: str, speed: str, taus: Sequence[Array]) -> W
 def _angle(cycle: Cycle, position: str, w: Array) -> Array:
     if position in cycle:
         return np.unwrap(cycle[position]) if position == "theta_m" else cycle[position]
-    return np.concatenate(([0.0], np.cumsum(np.diff(cycle["t"]) * 0.5 * (w[1:] + w[:-1]))))
+    return np.asarray(cumulative_trapezoid(w, cycle["t"], initial=0.0))
 
 
 def _orders(weak: Weak) -> tuple[float, ...]:

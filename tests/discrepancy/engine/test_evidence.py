@@ -16,7 +16,7 @@ from ema.discrepancy.engine.statistic import Prediction
 
 def known(mean: np.ndarray) -> Prediction:
     """Noise of unit covariance, and a rest as it should be."""
-    return Prediction(mean, np.eye(len(mean)), 10.0, 10.0, 20.0, 96)
+    return Prediction(mean, np.eye(len(mean)), 10.0, 10.0, 20.0)
 
 
 def test_one_fault_and_one_size_agree_with_the_integral_done_on_a_grid(toys):
@@ -114,7 +114,7 @@ def test_no_probability_is_surer_than_the_evidence():
 
 def test_a_rest_smaller_than_records_have_is_no_evidence_against():
     """What honest simulations may differ by is in every simulated record, and need not be in the measured one."""
-    less, likeliest, more = (Prediction(np.zeros(1), np.eye(1), rest, 10.0, 20.0, 96) for rest in (4.0, 8.0, 20.0))
+    less, likeliest, more = (Prediction(np.zeros(1), np.eye(1), rest, 10.0, 20.0) for rest in (4.0, 8.0, 20.0))
     assert less.log_rest(0.0) == pytest.approx(likeliest.log_rest(0.0))
     assert more.log_rest(0.0) < likeliest.log_rest(0.0) - 2.0
     assert more.log_rest(10.0) > more.log_rest(0.0)  # a law of another form may leave it

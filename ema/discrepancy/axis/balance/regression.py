@@ -163,8 +163,8 @@ def _solve(design: Array, y: Array) -> Array:
     return _of_normal(A.T @ A, A.T @ y) / size
 
 
-def _of_normal(gram: Array, right: Array, least: float = 1e-12) -> Array:
-    return np.asarray(np.linalg.pinv(gram, rcond=least, hermitian=True) @ right)
+def _of_normal(gram: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ right)
 
 
 def _held_out(rows: Rows, design: Array) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from ema.core.records import Array
 from ema.models import axis
@@ -32,7 +33,7 @@ def smooth_motion(plant: Measured, model: axis.Model, c: Course, half: float) ->
     elif c.speed is not None:
         w, a = local_polynomial(c.t, c.speed, n_half, 2)[:2]
         noise = c.noise.get("speed", 0.0) / n_half**0.5
-        theta = np.concatenate(([0.0], np.cumsum(np.diff(c.t) * 0.5 * (w[1:] + w[:-1]))))
+        theta = cumulative_trapezoid(w, c.t, initial=0.0)
     theta = theta + c.zero
     rest = max(SEEN * noise, CREEP * float(np.sqrt(np.mean(w**2))))
     direction = np.where(np.abs(w) > rest, np.sign(w), 0.0)

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from ema.core.records import Array
+from ema.discrepancy.axis.interval import interval
 from ema.discrepancy.axis.linear import in_metres
 
 from .found import Balance, Term, draw
 from .law import Law
-from .telling_records import INTERVAL, OF_BASE, SAID, by_record
+from .telling_records import OF_BASE, SAID, by_record, quantities, quantity, short
 
 BELOW = 2.0  # deviations below zero from which a value is implausible
 SURE, CONTRADICTED = 0.9, 0.1
@@ -28,27 +29,23 @@ def describe(b: Balance, *, linear: bool) -> dict[str, Any]:
     samples = draw(b)
     unit = "N" if linear else "N m"
     return {
-        "drive_rms": _short(b.drive**0.5),
+        "drive_rms": short(b.drive**0.5),
         "unit": unit,
         "explained": {
-            "plant_file": _short(b.explained(b.left_plain)),
-            "fitted": _short(b.explained(b.left_base)),
-            "with_laws": _short(b.explained(b.left)),
+            "plant_file": short(b.explained(b.left_plain)),
+            "fitted": short(b.explained(b.left_base)),
+            "with_laws": short(b.explained(b.left)),
         },
-        "left_rms": _short(b.left**0.5),
-        "noise_rms": _short(b.noise**0.5),
+        "left_rms": short(b.left**0.5),
+        "noise_rms": short(b.noise**0.5),
         "rows": len(b.model.rows.y),
-        "test_function": _short(2.0 * b.model.rows.half),
+        "test_function": short(2.0 * b.model.rows.half),
         "base": {name: _base(b, k, name, samples, linear) for k, name in enumerate(b.model.base)},
         **({"given": [of_law(b, law, samples) for law in b.given]} if b.given else {}),
         "terms": [_term(b, term, samples) for term in b.terms],
-        **({"creeps": _short(b.creeps)} if b.creeps else {}),
+        **({"creeps": short(b.creeps)} if b.creeps else {}),
         **({"by_record": by_record(b.agreements, b.model.rows.motion.records, linear=linear)} if b.agreements else {}),
     }
-
-
-def _short(x: float) -> float:
-    return float(f"{x:.5g}")
 
 
 def _nominal(b: Balance, name: str) -> float:
@@ -59,10 +56,8 @@ def _base(b: Balance, k: int, name: str, samples: Array, linear: bool) -> dict[s
     nominal = _nominal(b, name)
     more = 0.0 if name == "inertia" else nominal  # friction and drag are fitted beside the plant file's
     value = float(b.corrected.coefficients[k]) + more
-    low, high = np.percentile(samples[:, k] + more, INTERVAL)
     unit = in_metres(OF_BASE[name]) if linear else OF_BASE[name]
-    out: dict[str, Any] = {"value": _short(value), "low": _short(low), "high": _short(high), "unit": unit}
-    out["plant_file"] = nominal
+    out = {**quantity(value, *interval(name, value, samples[:, k] + more), unit), "plant_file": nominal}
     if value < -BELOW * float(np.std(samples[:, k])):
         out["implausible"] = f"{SAID[name]} cannot be negative: it may be {MADE_BY[name]}"
     return out
@@ -72,15 +67,11 @@ def of_law(b: Balance, law: Law, samples: Array) -> dict[str, Any]:
     """A law with its parameters."""
     part = b.model.part(law)
     values = law.values(b.corrected.coefficients[part])
-    spreads = [law.values(c) for c in samples[:, part]]
-    parameters = {}
-    for name, unit in law.parameters.items():
-        spread = np.array([s[name] for s in spreads])
-        if name.startswith("phase"):
-            spread = values[name] + np.angle(np.exp(1j * (spread - values[name])))
-        low, high = np.percentile(spread, INTERVAL)
-        parameters[name] = {"value": _short(values[name]), "low": _short(low), "high": _short(high), "unit": unit}
-    return {"name": law.name, "parameters": parameters, "sentence": law.sentence.format(**values)}
+    return {
+        "name": law.name,
+        "parameters": quantities(law, values, [law.values(c) for c in samples[:, part]]),
+        "sentence": law.sentence.format(**values),
+    }
 
 
 def _term(b: Balance, term: Term, samples: Array) -> dict[str, Any]:
@@ -90,7 +81,7 @@ def _term(b: Balance, term: Term, samples: Array) -> dict[str, Any]:
         "confidence": round(b.confidence(term), 4),
         "indistinguishable_from": list(term.others),
         "separated_by": term.law.separated_by,
-        "share": _short(term.power / b.drive),
+        "share": short(term.power / b.drive),
     }
     if "share" in values and term.law.is_friction and values["share"] < 0.0:
         out["implausible"] = f"friction cannot fall below zero with load: it may be {MADE_BY['share']}"

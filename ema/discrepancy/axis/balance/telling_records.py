@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ema.core.records import Array
+from ema.discrepancy.axis.interval import interval
 from ema.discrepancy.axis.linear import in_metres
+from ema.discrepancy.findings import WITHIN
 
 from .agreement import Agreement
 from .found import N_DRAWS
-from .law import BY_RECORD
+from .law import BY_RECORD, Law
 
-INTERVAL = (2.5, 97.5)  # percent
 SAID = {"inertia": "inertia", "dry_friction": "dry friction", "viscous_drag": "drag"}
 OF_BASE = {"inertia": "kg m^2", "dry_friction": "N m", "viscous_drag": "N m s/rad"}
 ELSE = "a neighbour's magnets, a sensor, another zero of the angle or another setting may act in one of them"
@@ -30,9 +30,9 @@ def by_record(found: Sequence[Agreement], records: Sequence[str], *, linear: boo
             "name": a.name,
             **({"law": a.law.key.removesuffix(BY_RECORD)} if a.law is not None else {}),
             "records": values,
-            "chi2": _short(a.chi2),
+            "chi2": short(a.chi2),
             "dof": a.dof,
-            "p": _short(a.p),
+            "p": short(a.p),
             "agree": agree,
             "shown_by": [name for name, shown in zip(records, a.shown, strict=True) if shown],
             "could_be_shown_by": [name for name, could in zip(records, a.could, strict=True) if could],
@@ -44,30 +44,31 @@ def by_record(found: Sequence[Agreement], records: Sequence[str], *, linear: boo
 def _values(a: Agreement, k: int, *, linear: bool) -> dict[str, Any]:
     if a.law is None:
         unit = in_metres(OF_BASE[a.name]) if linear else OF_BASE[a.name]
-        spread = 1.96 * float(np.sqrt(a.covariance[k][0, 0]))
+        spread = WITHIN * float(np.sqrt(a.covariance[k][0, 0]))
         own_value = float(a.values[k, 0])
-        return {"value": _quantity(own_value, own_value - spread, own_value + spread, unit)}
+        return {"value": quantity(own_value, own_value - spread, own_value + spread, unit)}
     own = a.law.repeats or a.law
     drawn = np.random.default_rng(0).multivariate_normal(a.values[k], a.covariance[k], N_DRAWS, method="eigh")
-    value, samples = own.values(a.values[k]), [own.values(c) for c in drawn]
-    return {name: _interval(name, value, samples, unit) for name, unit in own.parameters.items()}
+    return quantities(own, own.values(a.values[k]), [own.values(c) for c in drawn])
 
 
-def _interval(
-    name: str, value: Mapping[str, float], samples: Sequence[Mapping[str, float]], unit: str
-) -> dict[str, Any]:
-    spread: Array = np.array([s[name] for s in samples])
-    if name.startswith("phase"):
-        spread = value[name] + np.angle(np.exp(1j * (spread - value[name])))
-    low, high = np.percentile(spread, INTERVAL)
-    return _quantity(value[name], float(low), float(high), unit)
+def quantities(
+    law: Law, values: Mapping[str, float], drawn: Sequence[Mapping[str, float]]
+) -> dict[str, dict[str, Any]]:
+    """The parameters of a law with intervals of 95 %, which `drawn` have."""
+    return {
+        name: quantity(values[name], *interval(name, values[name], [s[name] for s in drawn]), unit)
+        for name, unit in law.parameters.items()
+    }
 
 
-def _quantity(value: float, low: float, high: float, unit: str) -> dict[str, Any]:
-    return {"value": _short(value), "low": _short(low), "high": _short(high), "unit": unit}
+def quantity(value: float, low: float, high: float, unit: str) -> dict[str, Any]:
+    """A value with its interval and unit, for findings.json."""
+    return {"value": short(value), "low": short(low), "high": short(high), "unit": unit}
 
 
-def _short(x: float) -> float:
+def short(x: float) -> float:
+    """Five digits."""
     return float(f"{x:.5g}")
 
 
