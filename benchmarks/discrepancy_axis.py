@@ -59,7 +59,7 @@ def look(names, seed):
         "structure": [term["sentence"] for term in o.structure.get("terms", [])],
         "rms": [o.records[0].rms_before, o.records[0].rms_after],
         "friction": [o.k_before[0] / F_d - 1.0, o.k_after[0] / F_d - 1.0],
-        "error": [o.heldout.err_before, o.heldout.err_after, o.heldout.noise_floor],
+        "error": [o.folds.err_before, o.folds.err_after, o.folds.noise_floor],
     }
 
 

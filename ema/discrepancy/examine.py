@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from .findings import reject
 from .fitting import Fit, fit, jacobian
 from .grade import Left, grade
-from .held_out import by_record, over_folds, residual_over_folds, training_gain
-from .outcome import Gain, Outcome
+from .held_out import by_record, over_folds, residual_over_folds, training_errors
+from .outcome import Outcome
 from .plant import Plant
 from .progress import Progress
 from .rounds import (
@@ -76,7 +77,6 @@ def examine(
         notes.append(f"{state.immaterial}: too little for a cause")
     # with terms that have no name, more is told than the verdict asked for
     is_chance = judge_model(plant, state.model).is_noise if terms else left.is_chance
-    folds = over_folds(plant, plain, state.model) if terms else left.error
     names = [f.name for f in plant.base]
     return Outcome(
         verdict=outcome,
@@ -84,9 +84,8 @@ def examine(
         p_value=verdict.p_value,
         effects=describe_effects(plant, state, trust, weighed, final.point, draw),
         structure=plant.describe_structure(terms, final.point) if terms or outcome == "unexplained" else {},
-        train=training_gain(plant, plain, state.model),
-        heldout=Gain(folds.err_before, folds.err_after, folds.noise_floor),
-        folds=folds,
+        train=training_errors(plant, plain, state.model),
+        folds=over_folds(plant, plain, state.model) if terms else left.error,
         left=left,
         posterior=weighed.described(trust),
         lost=[*state.unlikely, *_lost(state, weighed)],
@@ -117,8 +116,7 @@ def _lost(state: State, weighed: Weighed) -> list[dict[str, Any]]:
                 f"{lead.gain:.1f} ± {lead.error:.1f} nats behind {own.key} by what held-out parts say; in its place "
                 f"leaves {trial.rms:.3g} of them where noise is 1; {own.key}: {trials[own.key].rms:.3g}"
             )
-            row = {"name": key, "before": before.rms, "after": trial.rms, "nats": lead.gain, "nats_error": lead.error,
-                   "nats_of": "held-out parts", "why": why}  # fmt: skip
+            row = reject(key, before.rms, trial.rms, why, (lead.gain, lead.error), "held-out parts")
             if key not in rows or lead.gain < rows[key]["nats"]:
                 rows[key] = row
     return sorted(rows.values(), key=lambda row: row["nats"])

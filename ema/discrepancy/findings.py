@@ -230,6 +230,19 @@ class Findings:
         return said
 
 
+def reject(
+    name: str,
+    before: float,
+    after: float,
+    why: str,
+    nats: tuple[float | None, float | None] = (None, None),
+    of: str | None = None,
+) -> dict[str, Any]:
+    """What was considered and is not the answer (`Findings.rejected`); `nats` with their error, by what is `of`."""
+    row = {"name": name, "before": before, "after": after, "nats": nats[0], "nats_error": nats[1], "nats_of": of}
+    return {**row, "why": why}
+
+
 SURE = 0.9
 WITHIN = 1.96  # deviations from the value to either end of an interval of 95 %
 SEEN = 1.05  # times the noise, where a rest beside a cause is worth a word

@@ -7,20 +7,21 @@ from dataclasses import replace
 import numpy as np
 
 from .folds import Folds
-from .outcome import Gain, RecordGain
+from .outcome import RecordGain
 from .plant import Errors, Fitted, Plant
 from .selection import Tried, list_folds
 
 N_PARTS = 20  # at most, of all records together; neighbouring stretches of one record make one
 
 
-def training_gain(plant: Plant, plain: Tried, model: Tried) -> Gain:
+def training_errors(plant: Plant, plain: Tried, model: Tried) -> tuple[float, float]:
     """Errors before and after on the parts that the fits have seen."""
     blocks = [train for train, _ in list_folds(plant)]
     before, after = (
-        [plant.errors(f.point, own) for f, own in zip(t.fits, blocks, strict=True)] for t in (plain, model)
+        _pooled([plant.errors(f.point, own).error for f, own in zip(t.fits, blocks, strict=True)])
+        for t in (plain, model)
     )
-    return Gain(_pooled(before), _pooled(after), _pooled_floor(after))
+    return before, after
 
 
 def over_folds(plant: Plant, plain: Tried, model: Tried) -> Folds:
@@ -38,14 +39,14 @@ def over_folds(plant: Plant, plain: Tried, model: Tried) -> Folds:
 def residual_over_folds(plant: Plant, plain: Tried, model: Tried) -> Folds:
     """Mean squares of the whitened residual of every part, each by the fits that had not seen it; noise makes one."""
     parts = _parts(plant)
-    before, after = ([_mean_square(t, blocks) for _, _, blocks in parts] for t in (plain, model))
+    before, after = ([_rms(t, blocks) ** 2 for _, _, blocks in parts] for t in (plain, model))
     n = tuple(float(sum(model.held_out[j].size for j in blocks)) for _, _, blocks in parts)
     return Folds(tuple(name for name, _, _ in parts), tuple(before), tuple(after), (1.0,) * len(parts), n)
 
 
-def _mean_square(model: Tried, blocks: set[int]) -> float:
-    """Of some blocks, single wild samples clipped as in `Tried.rms`."""
-    return replace(model, held_out=tuple(model.held_out[j] for j in sorted(blocks))).rms ** 2
+def _rms(model: Tried, blocks: set[int]) -> float:
+    """`Tried.rms` of some blocks."""
+    return replace(model, held_out=tuple(model.held_out[j] for j in sorted(blocks))).rms
 
 
 def by_record(plant: Plant, plain: Tried, model: Tried) -> list[RecordGain]:
@@ -54,8 +55,10 @@ def by_record(plant: Plant, plain: Tried, model: Tried) -> list[RecordGain]:
     for group in dict.fromkeys(b.group for b in plant.blocks):
         mine = {j for j, b in enumerate(plant.blocks) if b.group == group}
         before, after = (_errors(plant, t, mine) for t in (plain, model))
-        rms = [replace(t, held_out=tuple(t.held_out[j] for j in sorted(mine))).rms for t in (plain, model)]
-        out.append(RecordGain(group, _pooled(before), _pooled(after), _pooled_floor(after), *rms))
+        errors = (
+            _pooled(x) for x in ([e.error for e in before], [e.error for e in after], [e.noise_floor for e in after])
+        )
+        out.append(RecordGain(group, *errors, *(_rms(t, mine) for t in (plain, model))))
     return out
 
 
@@ -96,9 +99,5 @@ def _of_part(plant: Plant, plain: Tried, model: Tried, blocks: set[int]) -> tupl
     return b, a, f, float(w.sum())
 
 
-def _pooled(errors: list[Errors]) -> float:
-    return float(np.sqrt(np.mean([e.error**2 for e in errors])))
-
-
-def _pooled_floor(errors: list[Errors]) -> float:
-    return float(np.sqrt(np.mean([e.noise_floor**2 for e in errors])))
+def _pooled(errors: list[float]) -> float:
+    return float(np.sqrt(np.mean([e**2 for e in errors])))

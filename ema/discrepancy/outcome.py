@@ -11,17 +11,8 @@ from .plant import Point
 
 
 @dataclass(frozen=True)
-class Gain:
-    """Error before and after on one set of blocks, and what noise alone would make of it."""
-
-    err_before: float
-    err_after: float
-    noise_floor: float
-
-
-@dataclass(frozen=True)
 class RecordGain:
-    """The same for one record on held-out blocks; `rms` is the whitened residual (1 is noise)."""
+    """Errors of one record on held-out blocks, and what noise makes of them; `rms`: whitened residual (1 is noise)."""
 
     name: str
     err_before: float
@@ -45,6 +36,10 @@ class Outcome:
         Name, sentence, confidence, what it cannot be told from, the experiment that would tell, parameters.
     structure : dict
         Terms without a name: orders, frequencies, dependence.
+    train : two floats
+        Error before and after on the parts that were fitted.
+    folds : Folds
+        The same of every part held out.
     mimicked : tuple of str
         Effects that, if they were there, would be taken for a change of the base parameters on these records.
     k_error : tuple of float
@@ -64,8 +59,9 @@ class Outcome:
     p_value: float
     effects: list[dict[str, Any]]
     structure: dict[str, Any]
-    train: Gain
-    heldout: Gain
+    train: tuple[float, float]
+    folds: Folds
+    left: Left
     base: list[str]
     k_before: list[float]
     k_after: list[float]
@@ -76,7 +72,5 @@ class Outcome:
     point: Point = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     rest: float = 0.0
-    folds: Folds | None = None
-    left: Left | None = None
     lost: list[dict[str, Any]] = field(default_factory=list)
     posterior: list[dict[str, Any]] = field(default_factory=list)

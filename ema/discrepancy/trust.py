@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
+from .findings import reject
 from .fitting import WILD, Fit
 from .grade import NAMED
 from .plant import Array, Candidate, Free, Plant
@@ -133,8 +134,7 @@ def _unlikely(key: str, odds: float, without: Tried, model: Tried) -> dict[str, 
         f"({odds:.0%}, with all that the data cannot tell from it): what it takes, the form of other laws or what "
         "stays unexplained may make"
     )
-    unknown = dict.fromkeys(("nats", "nats_error", "nats_of"))
-    return {"name": key, "before": without.rms, "after": model.rms, **unknown, "why": why}
+    return reject(key, without.rms, model.rms, why)
 
 
 def _differences(before: Tried, model: Tried) -> list[Array]:

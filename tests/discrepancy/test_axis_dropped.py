@@ -9,7 +9,9 @@ import numpy as np
 from ema.discrepancy.axis import candidates
 from ema.discrepancy.axis.dropped import list_dropped
 from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.outcome import Gain, Outcome
+from ema.discrepancy.folds import Folds
+from ema.discrepancy.grade import Left
+from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.selection import fit_base
 from ema.effects import registry
 from ema.effects.search import Span
@@ -22,8 +24,9 @@ def looked(axis_bench, drag, seed=1):
     plant = AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [record])
     point = fit_base(plant).fits[0].point
     tried = [{"name": "viscous_drag", "round": 1, "score": 1000.0, "error": 10.0, "rms": 1.0}]
-    nothing = Gain(0.0, 0.0, 0.0)
-    return plant, Outcome("unexplained", "", 0.0, [], {}, nothing, nothing, [], [], [], [], tried, point=point)
+    nothing = Folds((), (), (), (), ())
+    left = Left(False, nothing, nothing)
+    return plant, Outcome("unexplained", "", 0.0, [], {}, (0.0, 0.0), nothing, left, [], [], [], [], tried, point=point)
 
 
 def test_a_parameter_at_its_bound_is_fitted_again_with_wider_ones(axis_bench, monkeypatch):

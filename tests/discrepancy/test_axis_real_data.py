@@ -44,7 +44,7 @@ def test_cogging_of_the_same_order_and_size_is_found_at_standstill_and_in_motion
     assert line["order"]["value"] == 72
     # 4.9 mN m at standstill, 5.1 to 5.8 in the loop records: what they scatter by is not explained
     assert line["amplitude"]["value"] == pytest.approx(5.3e-3, rel=0.15)
-    assert outcome.heldout.err_after < outcome.heldout.err_before
+    assert outcome.folds.err_after < outcome.folds.err_before
     assert outcome.records[0].rms_after < 0.6 * outcome.records[0].rms_before
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from ema.discrepancy.examine import examine
 from ema.discrepancy.fitting import best_fit, fit, jacobian
-from ema.discrepancy.held_out import by_record, over_folds, residual_over_folds, training_gain
+from ema.discrepancy.held_out import by_record, over_folds, residual_over_folds, training_errors
 from ema.discrepancy.plant import Block, Candidate, Errors, Free
 from ema.discrepancy.progress import Progress
 from ema.discrepancy.rounds import State, leave_out, select
@@ -106,8 +106,8 @@ def test_a_hidden_effect_is_named_with_its_size_and_what_is_gained(seed):
     assert found["confidence"] > 0.9
     assert np.mean(found["parameters"]["b.size"]) == pytest.approx(0.8, abs=0.1)
     assert outcome.verdict == "explained"
-    assert outcome.heldout.err_after < 1.1 < outcome.heldout.err_before
-    assert outcome.train.err_after < outcome.train.err_before
+    assert outcome.folds.err_after < 1.1 < outcome.folds.err_before
+    assert outcome.train[1] < outcome.train[0]
 
 
 def test_two_effects_with_one_column_cannot_be_told_apart():
@@ -182,7 +182,7 @@ def test_gains_are_of_parts_that_were_not_fitted():
     assert residual_over_folds(toy, plain, with_a).err_after == pytest.approx(with_a.rms, rel=0.02)
     (record,) = by_record(toy, plain, with_a)
     assert record.err_after < record.err_before
-    assert training_gain(toy, plain, with_a).err_after <= gain.err_after * 1.02
+    assert training_errors(toy, plain, with_a)[1] <= gain.err_after * 1.02
 
 
 def test_noise_is_told_from_what_is_larger_or_correlated():

@@ -52,6 +52,12 @@ def columns(plant: EmaPlant, frees: Sequence[Free], point: Point, motions: Seque
     }
 
 
+def columns_of_all(plant: EmaPlant, of: Fit) -> Columns:
+    """The Jacobian of a fit with that of the motions that it was not fitted to."""
+    new = [m for m in range(plant.n_motions) if any((m, f.name) not in of.columns for f in of.free)]
+    return of.columns | columns(plant, of.free, of.point, new)
+
+
 @dataclass(frozen=True)
 class Fit:
     """A fitted model on some cycles.

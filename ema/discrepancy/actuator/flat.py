@@ -124,9 +124,8 @@ def _find_lowest(
 
 def _estimate_unseen(noise: Noise, A: Array, n_flat: int, cycles: Sequence[int]) -> Array:
     """What a difference between honest simulations makes of each parameter, along flat directions (the last of A)."""
-    of_noise = sum(float((noise.of(c).fresh ** 2).sum(axis=1).mean()) for c in cycles)
     along = np.linalg.inv(A)[:, len(A) - n_flat :]
-    return np.asarray(UNSEEN * np.sqrt(of_noise * (along**2).sum(axis=1)))
+    return np.asarray(UNSEEN * np.sqrt(noise.expected(cycles) * (along**2).sum(axis=1)))
 
 
 def _flat(J: Array, flat: float) -> tuple[Array, Array]:

@@ -170,6 +170,6 @@ def _differ(search: Search, left: Mapping[int, Array]) -> float:
         cycles: Sequence[int] = np.flatnonzero(search.plant.data.motion == motion).tolist()
         r = np.array([left[c] for c in cycles])
         found += float(((r - r.mean(axis=0)) ** 2).sum())
-        each = float((search.noise.motions[motion].fresh ** 2).sum(axis=1).mean()) * (1.0 + 1.0 / N_SEEDS)
+        each = search.noise.expected(cycles[:1]) * (1.0 + 1.0 / N_SEEDS)
         expected += (len(cycles) - 1) * each
     return found / expected if expected else 1.0

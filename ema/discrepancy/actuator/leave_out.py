@@ -12,7 +12,7 @@ from ema.core.records import Array
 from ema.discrepancy.folds import Folds, deal
 from ema.discrepancy.plant import Point
 
-from .fit import SEED, bounds, columns, residuals, solve_within_bounds, stacked_jacobian, step_to
+from .fit import SEED, bounds, columns_of_all, residuals, solve_within_bounds, stacked_jacobian, step_to
 from .model import FINAL_SEED, N_FINAL, N_GLANCE, Model
 from .plant import ENVELOPE_STEP, EmaPlant
 
@@ -40,9 +40,7 @@ class _Linear:
     @classmethod
     def of(cls, search: Search, model: Model, cycles: list[int]) -> _Linear:
         plant, noise, frees, point = search.plant, search.noise, model.fit.free, model.fit.point
-        known = model.fit.columns
-        new = [m for m in range(plant.n_motions) if any((m, f.name) not in known for f in frees)]
-        cols = known | columns(plant, frees, point, new)
+        cols = columns_of_all(plant, model.fit)
         r = residuals(plant, noise, point, cycles, N_FINAL, FINAL_SEED)
         glance = residuals(plant, noise, point, cycles, N_GLANCE)
         cost = {c: float(x @ x) for c, x in glance.items()}

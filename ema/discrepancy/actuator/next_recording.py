@@ -14,7 +14,7 @@ from ema.models import hf
 
 from .comparators import take_step
 from .cycles import prepare
-from .fit import columns, stacked_jacobian
+from .fit import columns, columns_of_all, stacked_jacobian
 from .model import Model
 from .motions import Motion, motions
 from .noise import Noise
@@ -97,10 +97,8 @@ def _rival(
 
 def _information(search: Search, model: Model) -> Array:
     """What this record knows of the rival's parameters, JᵀJ."""
-    frees, known = model.fit.free, model.fit.columns
-    new = [m for m in range(search.plant.n_motions) if any((m, f.name) not in known for f in frees)]
-    cols = known | columns(search.plant, frees, model.fit.point, new)
-    J = stacked_jacobian(search.noise, frees, cols, range(search.plant.data.n_cycles))
+    cols = columns_of_all(search.plant, model.fit)
+    J = stacked_jacobian(search.noise, model.fit.free, cols, range(search.plant.data.n_cycles))
     return np.asarray(J.T @ J)
 
 

@@ -32,7 +32,7 @@ def repeating(search: Search, point: Point) -> float | None:
         alike = [c for c in cycles if data.motion[c] == motion]
         if len(alike) < 2 or noise.misfit([left[c] for c in alike], alike) < FEWEST:
             continue
-        by_noise = float((noise.of(alike[0]).fresh ** 2).sum(axis=1).mean())
+        by_noise = noise.expected(alike[:1])
         common += len(alike) * float(np.mean([left[a] @ left[b] for a, b in combinations(alike, 2)]))
         own += sum(float(left[c] @ left[c]) - by_noise for c in alike)
     return common / own if own > 0.0 else None

@@ -12,7 +12,7 @@ from ema.discrepancy.plant import Point
 from ema.discrepancy.progress import Progress
 
 from .candidates import Candidate
-from .fit import N_SEEDS, SEED, Columns, Fit, columns, fit, refit_with_short_steps, residuals, residuals_at
+from .fit import N_SEEDS, SEED, Columns, Fit, columns_of_all, fit, refit_with_short_steps, residuals, residuals_at
 from .flat import settle
 from .free import K_FREE, Free
 from .model import FAR, FINAL_SEED, N_FINAL, N_GLANCE, Model, strip
@@ -81,10 +81,8 @@ class Search:
         """Is what `model` leaves on all cycles noise?"""
         cycles = sorted(self.train + self.heldout)
         left = residuals(self.plant, self.noise, model.fit.point, cycles, N_FINAL, FINAL_SEED)
-        frees, motions = model.fit.free, range(self.plant.n_motions)
-        only_heldout = [m for m in motions if any((m, f.name) not in model.fit.columns for f in frees)]
-        known = model.fit.columns | columns(self.plant, frees, model.fit.point, only_heldout)
-        cols = [self.noise.motions[m].white(np.array([known[m, f.name] for f in frees])).T for m in motions]
+        known, motions = columns_of_all(self.plant, model.fit), enumerate(self.noise.motions)
+        cols = [of.white(np.array([known[m, f.name] for f in model.fit.free])).T for m, of in motions]
         return judge(self.noise, [left[c] for c in cycles], cycles, cols, 1.0 / N_FINAL)
 
     def left_more(self, model: Model, other: Model, noises: Sequence[Noise]) -> float:

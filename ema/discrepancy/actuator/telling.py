@@ -10,7 +10,7 @@ import numpy as np
 from ema.core.names import FAULTS
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.engine.posterior import p_cause
-from ema.discrepancy.findings import WITHIN, Findings, FoundEffect, Gain, Quantity
+from ema.discrepancy.findings import WITHIN, Findings, FoundEffect, Gain, Quantity, reject
 from ema.discrepancy.plant import Point
 from ema.effects import registry
 
@@ -129,10 +129,7 @@ def describe_rejected(search: Search, before: Model, after: Model, outcome: Outc
             nats, of = 0.5 * (m.heldout - after.heldout) * m.by.expected(search.heldout), "held-out cycles"
         lost = f"{_behind(nats, error)} {answer} by {OF_NATS[of]}; " if nats is not None and of else ""
         why = f"{lost}leaves {m.heldout:.3g} of held-out cycles where noise is 1; {answer}: {after.heldout:.3g}"
-        rows.append(
-            {"name": " + ".join(sorted(m.names)), "before": before.heldout, "after": m.heldout,
-             "nats": nats, "nats_error": error, "nats_of": of, "why": why}
-        )  # fmt: skip
+        rows.append(reject(" + ".join(sorted(m.names)), before.heldout, m.heldout, why, (nats, error), of))
     return rows
 
 

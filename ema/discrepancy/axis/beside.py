@@ -49,13 +49,7 @@ class _Extended:
         self._clock = found.effects.get("clock_skew", {}).get("rate", 0.0)
         self._sensors = plant.model(point)
         self.between, self.benches, self.windows = plant.between, plant.benches, plant.windows
-        self.zeros = plant.zeros
-        self.base, self.bench_of, self.numbers, self.residuals = (
-            plant.base,
-            plant.bench_of,
-            plant.numbers,
-            plant.residuals,
-        )
+        self.zeros, self.base, self.bench_of, self.residuals = plant.zeros, plant.base, plant.bench_of, plant.residuals
         pairs = zip(plant.benches, plant.records, strict=True)
         self.records = tuple(replace(r, cycles=tuple(self._undone(b, c) for c in r.cycles)) for b, r in pairs)
 

@@ -14,7 +14,7 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.models.axis_config import LinearAxis
 
 from .naming import line
-from .weak_form import FEWEST, Weak, thin, weak_form
+from .weak_form import FEWEST, Weak, weak_form
 
 if TYPE_CHECKING:
     from .measured import Measured
@@ -94,7 +94,7 @@ def cogging_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> C
     """Lines of integer order that stand out of the torque residual, or None."""
     if isinstance(plant.plant, LinearAxis):
         return None
-    weak = thin(weak_form(plant, point, blocks))
+    weak = weak_form(plant, point, blocks)
     orders = integer_orders(weak)
     if len(orders) == 0 or len(weak.y) < FEWEST:
         return None

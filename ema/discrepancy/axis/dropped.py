@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ema.discrepancy.findings import reject
 from ema.discrepancy.fitting import Fit, best_fit
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Candidate, Free
@@ -50,10 +51,7 @@ def list_dropped(plant: AxisPlant, outcome: Outcome, named: set[str]) -> list[di
         if max([share, *(s for s, _ in wider)]) > SHARE:
             after = float(np.sqrt(1.0 + excess(fitted.residuals)))
             why = _why(plant, candidate, fitted, share, at, [text for _, text in wider])
-            unknown = dict.fromkeys(("nats", "nats_error", "nats_of"))  # held-out parts do not decide it
-            told.append(
-                {"name": candidate.key, "before": float(np.sqrt(1.0 + here)), "after": after, **unknown, "why": why}
-            )
+            told.append(reject(candidate.key, float(np.sqrt(1.0 + here)), after, why))
     return told
 
 

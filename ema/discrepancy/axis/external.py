@@ -26,7 +26,6 @@ NAME, ANOTHER_ZERO = "external_torque", "another_zero"
 NEIGHBOUR = 0.05  # probability that a motor whose own orders are not known has magnets beside it
 ALIKE = 0.01  # p above which all records but one agree
 SAME_SIZE = 0.1  # of an amplitude, that a record may differ by where its zero alone is another
-DEVIATIONS = 1.96  # of an interval of 95 %
 
 
 def add_external(plant: AxisPlant, found: Sequence[shared.FoundEffect]) -> list[shared.FoundEffect]:
@@ -45,7 +44,7 @@ def find_own_order(plant: AxisPlant) -> int | None:
 
 def _beside(plant: AxisPlant, e: shared.FoundEffect) -> shared.FoundEffect:
     """Cogging at an order that need not be the motor's own."""
-    if e.name != "cogging" or e.indistinguishable_from or not _torque_of(plant):
+    if e.name != "cogging" or e.indistinguishable_from or plant.plant.motion != "rotary":
         return e
     own, order = find_own_order(plant), e.parameters["order"].value
     if own is not None and order % own == 0.0:
@@ -60,10 +59,6 @@ def _beside(plant: AxisPlant, e: shared.FoundEffect) -> shared.FoundEffect:
         sentence=f"{e.sentence}, or a torque from outside the motor (a neighbour's magnets){reason}",
         separated_by=f"{e.separated_by}; {registry()[NAME].separated_by}",
     )
-
-
-def _torque_of(plant: AxisPlant) -> bool:
-    return plant.plant.motion == "rotary"
 
 
 @dataclass(frozen=True)
@@ -92,7 +87,7 @@ class _Apart:
 def _apart(plant: AxisPlant) -> list[_Apart]:
     """Lines on which records contradict each other, by what the balance says of them."""
     b = plant.balance
-    if b is None or len(plant.benches) < 2 or not _torque_of(plant):
+    if b is None or len(plant.benches) < 2 or plant.plant.motion != "rotary":
         return []
     records, turned = b.model.rows.motion.records, plant.zeros.values()
     out = []
@@ -126,7 +121,7 @@ def _p(values: Array, covariance: Array) -> float:
 def _is_shift(a: Agreement) -> bool:
     size = np.linalg.norm(a.values, axis=1)
     sd = np.sqrt(np.trace(a.covariance, axis1=1, axis2=2) / 2.0)
-    return bool(np.ptp(size) < DEVIATIONS * float(np.hypot(*np.sort(sd)[-2:])) + SAME_SIZE * size.max())
+    return bool(np.ptp(size) < shared.WITHIN * float(np.hypot(*np.sort(sd)[-2:])) + SAME_SIZE * size.max())
 
 
 def _named(a: _Apart) -> shared.FoundEffect:
@@ -135,7 +130,7 @@ def _named(a: _Apart) -> shared.FoundEffect:
     c = a.values[j] - a.values[i]
     A = float(np.hypot(*c))
     sd = float(np.sqrt(np.trace(a.covariance[i] + a.covariance[j]) / 2.0))
-    spread, turn = DEVIATIONS * sd, DEVIATIONS * sd / A
+    spread, turn = shared.WITHIN * sd, shared.WITHIN * sd / A
     phase = float(np.arctan2(c[0], c[1]))
     sizes = ", ".join(
         f"{np.hypot(*v):.3g} N m at phase {np.arctan2(v[0], v[1]):+.2f} rad in {name}"

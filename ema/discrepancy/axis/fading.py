@@ -18,7 +18,7 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 from ema.effects.stribeck import factor
 
-from .weak_form import FEWEST, Weak, thin, weak_form
+from .weak_form import FEWEST, Weak, weak_form
 
 if TYPE_CHECKING:
     from ema.effects.search import AxisSizes
@@ -81,7 +81,7 @@ def fading_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Sequen
     """The likeliest speeds and shapes as starts, each with friction and inertia as they are beside it."""
     if any(name.startswith(f"{NAME}.") for name in point):
         return None
-    weak = thin(weak_form(plant, point, blocks))
+    weak = weak_form(plant, point, blocks)
     names = ["F_d", *(f.name for f in plant.base if f.name in ("J", "M"))]
     columns = [weak.integrate(np.sign(weak.motion.direction)), weak.inertia][: len(names)]
     limits = {f.name: (f.low, f.high) for f in plant.base}

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from ema.models import axis
     from ema.models.axis_config import Axis
 
-    from .naming import Numbers
     from .windows import Bench, Window
 
 
@@ -53,10 +52,6 @@ class Measured(Protocol):
 
     def bench_of(self, block: int) -> Bench:
         """The record a block belongs to."""
-        ...
-
-    def numbers(self, point: Point) -> Numbers:
-        """What the point means to the model."""
         ...
 
     def model(self, point: Point) -> axis.Model:

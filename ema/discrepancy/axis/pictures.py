@@ -12,7 +12,7 @@ from ema.discrepancy.report import Picture, picture
 from ema.models.axis_config import LinearAxis
 
 from .balance_pictures import balance_pictures
-from .cogging import integer_orders, thin
+from .cogging import integer_orders
 from .plant import AxisPlant
 from .weak_form import weak_form
 
@@ -65,7 +65,7 @@ def _torque(plant: AxisPlant, before: Point, after: Point) -> Picture:
     left, right = figure.subplots(1, 2)
     blocks = list(range(len(plant.windows)))
     for point, colour, label in ((before, "C1", "nominal model"), (after, "C0", "extended model")):
-        weak = thin(weak_form(plant, point, blocks))
+        weak = weak_form(plant, point, blocks)
         m = weak.motion
         orders = integer_orders(weak)[:N_ORDERS]
         if len(orders) and len(weak.y):

@@ -24,7 +24,7 @@ from .balance.of_records import balance, plain_of
 from .balance.own_zeros import refine_zeros
 from .intake import take_in
 from .measured import Zero
-from .naming import Numbers, numbers_of
+from .naming import numbers_of
 from .noise import ESTIMATE_UNCERTAINTY
 from .noise_model import position_noise, whitener, without_start
 from .pack import Pack
@@ -187,10 +187,6 @@ class AxisPlant:
         return describe.structure(self, terms, point)
 
     # ---- simulation --------------------------------------------------------------------------------------------
-
-    def numbers(self, point: Point) -> Numbers:
-        """What the point means to the model."""
-        return numbers_of(point)
 
     def model(self, point: Point) -> axis.Model:
         """The kernel's numbers at a point."""

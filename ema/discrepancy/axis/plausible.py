@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ema.core.records import Array, Cycle
+from ema.discrepancy.findings import WITHIN
 from ema.discrepancy.outcome import Outcome
 from ema.models.axis_config import LinearAxis
 
@@ -143,7 +144,7 @@ def describe(plant: AxisPlant) -> dict[str, Any]:
     pairs = (("R", seen.R, seen.R_error, "ohm"), ("k_e", seen.k_e, seen.k_e_error, "V s/rad"))
     linear = isinstance(plant.plant, LinearAxis)
     return {
-        name: {"value": value, "low": value - 1.96 * error, "high": value + 1.96 * error,
+        name: {"value": value, "low": value - WITHIN * error, "high": value + WITHIN * error,
                "unit": in_metres(unit) if linear else unit, "plant_file": getattr(plant.plant, name)}
         for name, value, error, unit in pairs
     }  # fmt: skip

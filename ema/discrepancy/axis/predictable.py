@@ -12,7 +12,7 @@ from ema.models.axis_config import LinearAxis
 
 from .cogging import ALARM, integer_orders, scan
 from .fading import SPEEDS, fadings
-from .weak_form import FEWEST, Weak, thin, weak_form
+from .weak_form import FEWEST, Weak, weak_form
 from .windows import Bench
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def predictable_time(plant: Measured, bench: Bench) -> float:
     moving = [j for j, w in enumerate(plant.windows) if w.group == bench.name and not w.static]
     if not moving:
         return LONGEST_WINDOW
-    weak = thin(weak_form(plant, {}, moving))
+    weak = weak_form(plant, {}, moving)
     if len(weak.y) < FEWEST:
         return LONGEST_WINDOW
     growth = max(_of_plant_file(plant, weak), _of_lines(plant, weak), _of_falling_friction(plant, weak))

@@ -70,10 +70,10 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
         return Ruling([*own, *name_laws(plant, b, find_missing(b, []))], _measure_left(plant, b), NEIGHBOUR)
     if b.creeps:
         return Ruling(name_laws(plant, b, find_missing(b, [])), _measure_left(plant, b), CREEPS.format(b.creeps))
-    is_blind = outcome.verdict == "adequate" and outcome.heldout.noise_floor > WITNESS
+    is_blind = outcome.verdict == "adequate" and outcome.folds.noise_floor > WITNESS
     named = find_missing(b, []) if is_blind else []
     if named and not _is_refuted(plant, outcome, b):
-        return Ruling(name_laws(plant, b, named), _measure_left(plant, b), BLIND.format(outcome.heldout.noise_floor))
+        return Ruling(name_laws(plant, b, named), _measure_left(plant, b), BLIND.format(outcome.folds.noise_floor))
     return None
 
 

@@ -11,7 +11,7 @@ from ema.core.records import Array
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 
-from .weak_form import FEWEST, thin, weak_form
+from .weak_form import FEWEST, weak_form
 
 if TYPE_CHECKING:
     from ema.effects.search import AxisSizes
@@ -28,7 +28,7 @@ def stretch_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Seque
     """For each width the likeliest place as a start; None where the effect is in the model already."""
     if any(name.startswith(NAME) for name in point):
         return None
-    weak = thin(weak_form(plant, point, blocks))
+    weak = weak_form(plant, point, blocks)
     if len(weak.y) < FEWEST:
         return None
     q, rest = weak.beside()

@@ -18,7 +18,7 @@ from ema.effects.search import AxisSizes
 from ema.effects.torque_term import COLUMNS, EVEN, NEUTRAL, power
 
 from .sizes import sizes
-from .weak_form import FEWEST, Motion, Weak, thin, weak_form
+from .weak_form import FEWEST, Motion, Weak, weak_form
 
 if TYPE_CHECKING:
     from .measured import Measured
@@ -45,7 +45,7 @@ class Term:
 
 def search(plant: Measured, point: Point, blocks: Sequence[int]) -> list[Candidate]:
     """The best member of each family, the one that explains most first."""
-    weak = thin(weak_form(plant, point, blocks))
+    weak = weak_form(plant, point, blocks)
     if len(weak.y) < FEWEST:
         return []
     m = weak.motion

@@ -18,6 +18,8 @@ from scipy.sparse import csr_array
 from ema.models import axis
 from ema.models.axis_layout import row
 
+from .naming import numbers_of
+
 if TYPE_CHECKING:
     from ema.core.records import Array
     from ema.discrepancy.plant import Point
@@ -96,9 +98,9 @@ class Weak:
 
 
 def weak_form(plant: Measured, point: Point, blocks: Sequence[int]) -> Weak:
-    """Weak-form residual of the model at `point`."""
+    """Weak-form residual of the model at `point`; of at most `MAX_ROWS` test functions, evenly."""
     model = plant.model(point)
-    zeros = plant.numbers(point).zeros
+    zeros = numbers_of(point).zeros
     parts: list[tuple[Array, ...]] = []
     pieces: list[Weak] = []
     offset = 0
@@ -125,14 +127,8 @@ def weak_form(plant: Measured, point: Point, blocks: Sequence[int]) -> Weak:
     weight = np.concatenate([_padded(p.weight, width, repeat=False) for p in pieces])
     join = [np.concatenate([getattr(p, name) for p in pieces]) for name in ("y", "sigma", "inertia", "block")]
     y, sigma, inertia, block = join
-    return Weak(y, sigma, inertia, motion, index, weight, block.astype(int))
-
-
-def thin(weak: Weak) -> Weak:
-    """At most `MAX_ROWS` test functions, evenly."""
-    if len(weak.y) <= MAX_ROWS:
-        return weak
-    return weak[np.unique(np.linspace(0, len(weak.y) - 1, MAX_ROWS).astype(int))]
+    weak = Weak(y, sigma, inertia, motion, index, weight, block.astype(int))
+    return weak if len(y) <= MAX_ROWS else weak[np.unique(np.linspace(0, len(y) - 1, MAX_ROWS).astype(int))]
 
 
 def _piece(y: Array, sigma: Array, inertia: Array, index: np.ndarray, weight: Array, block: int) -> Weak:

@@ -50,11 +50,10 @@ def discrepancy(
 def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     """Findings as every plant reports them."""
     gain = shared.Gain(
-        outcome.train.err_before,
-        outcome.train.err_after,
-        outcome.heldout.err_before,
-        outcome.heldout.err_after,
-        outcome.heldout.noise_floor,
+        *outcome.train,
+        outcome.folds.err_before,
+        outcome.folds.err_after,
+        outcome.folds.noise_floor,
         tuple(outcome.k_before),
         tuple(outcome.k_after),
         k_interval=tuple(
@@ -66,7 +65,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         scale=100.0,
         unit="%",
         folds=outcome.folds,
-        residual=outcome.left.residual if outcome.left else None,
+        residual=outcome.left.residual,
     )
     structure = dict(outcome.structure)
     if structure:
@@ -82,10 +81,10 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         gain = shared.Gain(**of_balance(plant.balance, rules.left, outcome, isinstance(plant.plant, LinearAxis)))
         notes, structure = [rules.note, *(note for note in notes if note in SAID.values())], {}
     else:
-        follows = outcome.heldout.noise_floor <= WITNESS
+        follows = outcome.folds.noise_floor <= WITNESS
         told_by_runs = [_effect(e) for e in outcome.effects]
         found, by_balance = merge(plant, told_by_runs, outcome.verdict, outcome.point, follows=follows)
-        verdict = grade(outcome.left, named=True) if by_balance is not None and outcome.left else outcome.verdict
+        verdict = grade(outcome.left, named=True) if by_balance is not None else outcome.verdict
     by_runs = rules is None and by_balance is None
     found = add_external(plant, found)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]

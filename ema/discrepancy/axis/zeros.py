@@ -12,7 +12,7 @@ from ema.models.axis_config import LinearAxis
 
 from .cogging import integer_orders, scan
 from .overlap import between
-from .weak_form import FEWEST, thin, weak_form
+from .weak_form import FEWEST, weak_form
 
 if TYPE_CHECKING:
     from .measured import Measured, Zero
@@ -31,7 +31,7 @@ def zeros(plant: Measured) -> dict[str, Zero]:
 
 def _lines(plant: Measured, name: str) -> dict[float, complex]:
     """z_n by order. [N m]"""
-    weak = thin(weak_form(plant, {}, [j for j, w in enumerate(plant.windows) if w.group == name]))
+    weak = weak_form(plant, {}, [j for j, w in enumerate(plant.windows) if w.group == name])
     orders = integer_orders(weak)
     if len(orders) == 0 or len(weak.y) < FEWEST:
         return {}

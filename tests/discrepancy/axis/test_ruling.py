@@ -29,7 +29,7 @@ FITTED = {"J": 0.14, "F_d": 0.25, "C": 0.02}  # as free runs would
 
 def as_free_runs_had(verdict, noise=0.5):
     """As free runs of which noise makes a part of the motion."""
-    return SimpleNamespace(verdict=verdict, point=FITTED, heldout=SimpleNamespace(noise_floor=noise))
+    return SimpleNamespace(verdict=verdict, point=FITTED, folds=SimpleNamespace(noise_floor=noise))
 
 
 def test_a_law_that_free_runs_are_blind_to_is_named_by_the_balance_which_says_so(short_pendulum):

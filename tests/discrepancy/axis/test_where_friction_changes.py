@@ -9,7 +9,7 @@ import pytest
 from ema.discrepancy.axis.fading import SPEEDS, fading_candidate, fadings
 from ema.discrepancy.axis.sizes import sizes
 from ema.discrepancy.axis.stretch import WIDTHS, stretch_candidate
-from ema.discrepancy.axis.weak_form import thin, weak_form
+from ema.discrepancy.axis.weak_form import weak_form
 
 AT = {"F_d": on_paper.F_D}
 EXCESS, SPEED = 0.6, 0.8
@@ -59,7 +59,7 @@ def test_friction_that_falls_is_looked_for_from_about_its_speed_and_size(with_fa
 
 
 def test_the_likeliest_speed_leaves_least_and_the_friction_is_the_larger_one_at_rest(with_falling):
-    weak = thin(weak_form(with_falling, AT, on_paper.everywhere(with_falling)))
+    weak = weak_form(with_falling, AT, on_paper.everywhere(with_falling))
     every = fadings(weak, weak.always(), SPEEDS * 5.0)
     assert [f.left for f in every] == sorted(f.left for f in every)
     assert all(f.torque > 0.0 for f in every)
@@ -68,14 +68,14 @@ def test_the_likeliest_speed_leaves_least_and_the_friction_is_the_larger_one_at_
 
 def test_friction_that_rises_with_speed_does_not_fall():
     plant = on_paper.plant(on_paper.cycle(lambda t, theta, w: -0.3 * falling(t, theta, w)))
-    weak = thin(weak_form(plant, AT, on_paper.everywhere(plant)))
+    weak = weak_form(plant, AT, on_paper.everywhere(plant))
     assert fadings(weak, weak.always(), SPEEDS * 5.0) == []
     (start,) = fading(plant).starts  # where nothing is known
     assert start.keys() == {f.name for f in fading(plant).free}
 
 
 def test_friction_that_does_not_fall_is_explained_no_better(quiet, with_falling):
-    weak, other = (thin(weak_form(p, AT, on_paper.everywhere(p))) for p in (quiet, with_falling))
+    weak, other = (weak_form(p, AT, on_paper.everywhere(p)) for p in (quiet, with_falling))
     before = [float(w.beside()[1] @ w.beside()[1]) for w in (weak, other)]
     after = [fadings(w, w.always(), SPEEDS * 5.0) for w in (weak, other)]
     assert not after[0] or after[0][0].left > 0.9 * before[0]
