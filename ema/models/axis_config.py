@@ -162,6 +162,11 @@ class Axis(Settings):
         return {}
 
     @property
+    def is_linear(self) -> bool:
+        """Whether it slides: position in metres, forces in newtons."""
+        return self.motion == "linear"
+
+    @property
     def is_force(self) -> bool:
         """Whether a measured force or torque drives."""
         return self.drive in ("force", "torque")

@@ -23,7 +23,6 @@ from ema.models.actuator import Actuator
 from .conditions import take_recorded_conditions
 from .cycles import prepare
 from .entrants import weigh_sets
-from .examination import Examination
 from .gear import find_resonance, start_swinging
 from .growing import describe, find_faults_beside, find_growing_faults, widen
 from .measured import Measured
@@ -72,6 +71,18 @@ def is_named(outcome: Outcome, model: Model, effect: str, *rivals: str) -> bool:
     p = dict(zip((effect, *rivals), probabilities(outcome, model, effect, *rivals), strict=True))
     of_effects = sum(x for name, x in p.items() if name in registry())
     return sum(p.values()) >= NAMED and of_effects >= IN_SET * sum(p.values())
+
+
+@dataclass(frozen=True)
+class Examination:
+    """The answer with what the report draws."""
+
+    findings: Findings
+    search: Search
+    before: Model
+    after: Model
+    verdict_before: Verdict
+    verdict_after: Verdict
 
 
 @dataclass(frozen=True)

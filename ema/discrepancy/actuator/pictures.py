@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,13 +15,15 @@ from ema.discrepancy.plant import Point
 from ema.discrepancy.report import Picture, picture
 from ema.effects.base import T_REFERENCE
 
-from .examination import Examination
 from .features import GROUPS, SECTORS
 from .leave_out import settled
 from .model import FINAL_SEED, N_FINAL
 from .plant import ENVELOPE_STEP
 from .thinning import choose_evenly
 from .weak import ORDERS, Torque, line, share_explained, torque
+
+if TYPE_CHECKING:
+    from .examine import Examination
 
 N_SHOWN = 3  # cycles side by side
 BEFORE, AFTER, NOISE = "#c0392b", "#1f6fb2", "#b9bec6"

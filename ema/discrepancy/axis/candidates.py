@@ -10,7 +10,6 @@ import numpy as np
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 from ema.effects.search import AxisSizes
-from ema.models.axis_config import LinearAxis
 
 from .cogging import cogging_candidate
 from .fading import fading_candidate
@@ -29,7 +28,7 @@ BASE_RANGE = 20.0  # a fitted parameter stays within this factor of the plant fi
 def base(plant: Measured) -> tuple[Free, ...]:
     """Friction level, and the parameters the plant file names under `fitted`."""
     p, s = plant.plant, sizes(plant)
-    unit = "N" if isinstance(p, LinearAxis) else "N m"
+    unit = "N" if p.is_linear else "N m"
     free = [Free("F_d", unit, 0.0, 3.0 * s.torque, min(p.F_d, 2.9 * s.torque), 0.05 * s.torque, 1e-3 * s.torque)]
     for name in p.fitted:
         value = float(getattr(p, name))

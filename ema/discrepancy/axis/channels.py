@@ -11,7 +11,7 @@ from scipy.signal import correlate, savgol_filter
 from ema.core.errors import RecordError
 from ema.core.names import CHANNELS
 from ema.core.records import Array, Record, require
-from ema.models.axis_config import Axis, LinearAxis
+from ema.models.axis_config import Axis
 
 MIN_SAMPLES = 40
 MAX_LAG = 30  # samples; less is a delay that can be examined
@@ -36,7 +36,7 @@ class Roles:
 
 def roles(plant: Axis, record: Record) -> Roles:
     """Roles for this record; RecordError says what is missing."""
-    position, speed = ("q", "v") if isinstance(plant, LinearAxis) else ("theta_m", "w_m")
+    position, speed = ("q", "v") if plant.is_linear else ("theta_m", "w_m")
     kind = _kind(plant, record)
     drive = DRIVE_CHANNEL[plant.drive if plant.is_force else kind]
     require(record, ("t", drive), min_samples=2)

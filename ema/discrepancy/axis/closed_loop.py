@@ -14,7 +14,7 @@ import numpy as np
 from ema.core.records import Array, Cycle
 from ema.discrepancy.plant import Point
 from ema.models import axis
-from ema.models.axis_config import LinearAxis, PositionLoop
+from ema.models.axis_config import PositionLoop
 
 from .intake import of_loop
 
@@ -36,7 +36,7 @@ class LoopRun:
 def closed_loop(plant: AxisPlant, point: Point) -> LoopRun | None:
     """Errors over all cycles; None where no position loop is declared, or no reference recorded."""
     p, loop = plant.plant, plant.plant.position_loop
-    position, reference = ("q", "q_ref") if isinstance(p, LinearAxis) else ("theta_m", "theta_ref")
+    position, reference = ("q", "q_ref") if p.is_linear else ("theta_m", "theta_ref")
     if loop is None:
         return None
     model = plant.model(point)

@@ -11,7 +11,6 @@ from scipy import stats
 
 from ema.core.records import Array
 from ema.discrepancy.plant import Candidate, Free, Point
-from ema.models.axis_config import LinearAxis
 
 from .naming import line
 from .weak_form import FEWEST, Weak, weak_form
@@ -92,7 +91,7 @@ def integer_orders(weak: Weak) -> Array:
 
 def cogging_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Candidate | None:
     """Lines of integer order that stand out of the torque residual, or None."""
-    if isinstance(plant.plant, LinearAxis):
+    if plant.plant.is_linear:
         return None
     weak = weak_form(plant, point, blocks)
     orders = integer_orders(weak)

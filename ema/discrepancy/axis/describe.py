@@ -9,7 +9,6 @@ import numpy as np
 
 from ema.discrepancy.plant import Candidate, Point
 from ema.effects import registry
-from ema.models.axis_config import LinearAxis
 
 from .cogging import MIN_LINE
 from .interval import interval
@@ -48,7 +47,6 @@ def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Se
                 "name": effect.name,
                 "sentence": said(effect.said(values, own.parameters.get("F_d", plant.plant.F_d))),
                 "separated_by": said(effect.separated_by),
-                "mistaken_for": list(effect.mistaken_for),
                 "parameters": parameters,
             }
             out.append(entry | (_line(plant, values) if effect.name == "cogging" else {}))
@@ -57,7 +55,7 @@ def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Se
 
 def _said(plant: Measured) -> Callable[[str], str]:
     """How sentences and units are said of this axis and its drive."""
-    linear = isinstance(plant.plant, LinearAxis)
+    linear = plant.plant.is_linear
     return lambda text: of_axis(by_drive(text, plant.plant.drive), linear=linear)
 
 
@@ -111,7 +109,7 @@ def _whole(effects_: dict[str, dict[str, float]], part: dict[str, float]) -> tup
 def structure(plant: Measured, terms: Sequence[Candidate], point: Point) -> dict[str, Any]:
     """What the unnamed terms look like."""
     out: dict[str, Any] = {"terms": [], "orders": [], "frequencies": [], "depends_on": []}
-    unit = "N" if isinstance(plant.plant, LinearAxis) else "N m"
+    unit = "N" if plant.plant.is_linear else "N m"
     for candidate in terms:
         key = candidate.free[0].name.split(".")[0]
         values = {name.removeprefix(f"{key}."): v for name, v in point.items() if name.startswith(f"{key}.")}

@@ -16,7 +16,6 @@ from ema.discrepancy.fitting import Fit, best_fit
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Candidate, Free
 from ema.discrepancy.trust import at_bound
-from ema.models.axis_config import LinearAxis
 
 from .linear import in_metres
 from .witness import N_ITERATIONS, excess
@@ -84,7 +83,7 @@ def _wider(
 
 
 def _said(plant: AxisPlant, f: Free, fitted: Fit) -> str:
-    unit = in_metres(f.unit) if isinstance(plant.plant, LinearAxis) else f.unit
+    unit = in_metres(f.unit) if plant.plant.is_linear else f.unit
     return f"{f.name} = {fitted.point[f.name]:.3g} {unit}"
 
 

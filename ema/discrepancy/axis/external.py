@@ -44,7 +44,7 @@ def find_own_order(plant: AxisPlant) -> int | None:
 
 def _beside(plant: AxisPlant, e: shared.FoundEffect) -> shared.FoundEffect:
     """Cogging at an order that need not be the motor's own."""
-    if e.name != "cogging" or e.indistinguishable_from or plant.plant.motion != "rotary":
+    if e.name != "cogging" or e.indistinguishable_from or plant.plant.is_linear:
         return e
     own, order = find_own_order(plant), e.parameters["order"].value
     if own is not None and order % own == 0.0:
@@ -87,7 +87,7 @@ class _Apart:
 def _apart(plant: AxisPlant) -> list[_Apart]:
     """Lines on which records contradict each other, by what the balance says of them."""
     b = plant.balance
-    if b is None or len(plant.benches) < 2 or plant.plant.motion != "rotary":
+    if b is None or len(plant.benches) < 2 or plant.plant.is_linear:
         return []
     records, turned = b.model.rows.motion.records, plant.zeros.values()
     out = []

@@ -17,7 +17,7 @@ import numpy as np
 
 from ema.core.errors import RecordError
 from ema.core.records import Array, Cycle, Record
-from ema.models.axis_config import Axis, LinearAxis, PositionLoop
+from ema.models.axis_config import Axis, PositionLoop
 
 from .balance.smooth import local_polynomial
 from .channels import find_runs
@@ -54,7 +54,7 @@ def _driven(plant: Axis, record: Record) -> Record:
 
 def ask_of_loop(plant: Axis, loop: PositionLoop, cycle: Cycle, name: str) -> Array:
     """What a position loop asks for along the measured motion, in its own unit."""
-    position, reference = ("q", "q_ref") if isinstance(plant, LinearAxis) else ("theta_m", "theta_ref")
+    position, reference = ("q", "q_ref") if plant.is_linear else ("theta_m", "theta_ref")
     missing = [channel for channel in (position, reference) if channel not in cycle]
     if missing:
         raise RecordError(f"{name}: position_loop needs the channel {missing[0]} (has {', '.join(cycle.channels)})")

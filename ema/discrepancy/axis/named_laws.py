@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from ema.discrepancy import findings as shared
 from ema.discrepancy.grade import NAMED
 from ema.effects import registry
-from ema.models.axis_config import LinearAxis
 
 from .balance.as_effects import effects, friction
 from .balance.found import Balance, Term, draw
@@ -40,7 +39,7 @@ def name_law(b: Balance, term: Term) -> str:
 
 
 def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.FoundEffect:
-    effect, linear = registry()[name], isinstance(plant.plant, LinearAxis)
+    effect, linear = registry()[name], plant.plant.is_linear
     said = partial(of_axis, linear=linear)
     values = effects(b, term)[name]
     samples = [effects(b, term, c)[name] for c in draw(b)]

@@ -9,7 +9,6 @@ from ema.core.names import CHANNELS
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Point
 from ema.discrepancy.report import Picture, picture
-from ema.models.axis_config import LinearAxis
 
 from .balance_pictures import balance_pictures
 from .cogging import integer_orders
@@ -26,7 +25,7 @@ def pictures(plant: AxisPlant, outcome: Outcome) -> list[Picture]:
     out = [_run(plant, name, before, outcome.point) for name in (b.name for b in plant.benches)]
     out.append(_torque(plant, before, outcome.point))
     if plant.balance is not None:
-        out += balance_pictures(plant.balance, linear=isinstance(plant.plant, LinearAxis))
+        out += balance_pictures(plant.balance, linear=plant.plant.is_linear)
     return out
 
 
@@ -76,7 +75,7 @@ def _torque(plant: AxisPlant, before: Point, after: Point) -> Picture:
                 size.append(float(np.hypot(c[0], c[1])))
             left.plot(orders, size, colour, lw=1, label=label)
         right.plot(weak.integrate(m.w), weak.y, colour, ls="", marker=".", ms=1, label=label)
-    linear = isinstance(plant.plant, LinearAxis)
+    linear = plant.plant.is_linear
     residual = "force residual [N]" if linear else "torque residual [N m]"
     left.set_xlabel("spatial frequency [rad/m]" if linear else "order [1/turn]")
     left.set_ylabel(f"{residual}, amplitude")

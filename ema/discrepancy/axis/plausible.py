@@ -15,7 +15,6 @@ import numpy as np
 from ema.core.records import Array, Cycle
 from ema.discrepancy.findings import WITHIN
 from ema.discrepancy.outcome import Outcome
-from ema.models.axis_config import LinearAxis
 
 from .balance.smooth import local_polynomial
 from .linear import in_metres
@@ -60,7 +59,7 @@ def find_implausible(plant: AxisPlant, outcome: Outcome) -> list[str]:
     seen = electrical(plant)
     if seen is None or p.R is None or p.k_e is None:
         return out
-    unit = in_metres("V s/rad") if isinstance(p, LinearAxis) else "V s/rad"
+    unit = in_metres("V s/rad") if p.is_linear else "V s/rad"
     if float(p.R) / FACTOR > seen.R and float(p.R) - seen.R > CLEAR * seen.R_error:
         out.append(f"the record shows R = {seen.R:.3g} ohm, the plant file says {p.R:.3g}: it may be {MADE_BY['R']}")
     if float(p.R) * FACTOR < seen.R and seen.R - float(p.R) > CLEAR * seen.R_error:
@@ -93,7 +92,7 @@ def _fitted(plant: AxisPlant, outcome: Outcome) -> list[str]:
         if f.name not in MADE_BY or f.name not in outcome.point:
             continue
         value, nominal = float(outcome.point[f.name]), float(getattr(p, f.name))
-        unit = in_metres(f.unit) if isinstance(p, LinearAxis) else f.unit
+        unit = in_metres(f.unit) if p.is_linear else f.unit
         if f.name == "F_d":
             if value <= 0.0 < nominal:
                 out.append(f"no dry friction was fitted at all (plant file {nominal:.3g} {unit}): {MADE_BY['F_d']}")
@@ -127,7 +126,7 @@ def electrical(plant: AxisPlant) -> Electrical | None:
 
 
 def _rows(plant: AxisPlant, c: Cycle) -> tuple[Array, Array] | None:
-    linear = isinstance(plant.plant, LinearAxis)
+    linear = plant.plant.is_linear
     speed, position = ("v", "q") if linear else ("w_m", "theta_m")
     if c.n_samples < FEWEST or not {speed, position} & set(c.channels):
         return None
@@ -142,7 +141,7 @@ def describe(plant: AxisPlant) -> dict[str, Any]:
     if seen is None:
         return {}
     pairs = (("R", seen.R, seen.R_error, "ohm"), ("k_e", seen.k_e, seen.k_e_error, "V s/rad"))
-    linear = isinstance(plant.plant, LinearAxis)
+    linear = plant.plant.is_linear
     return {
         name: {"value": value, "low": value - WITHIN * error, "high": value + WITHIN * error,
                "unit": in_metres(unit) if linear else unit, "plant_file": getattr(plant.plant, name)}

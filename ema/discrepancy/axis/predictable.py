@@ -8,7 +8,6 @@ import numpy as np
 from scipy import stats
 
 from ema.models import axis
-from ema.models.axis_config import LinearAxis
 
 from .cogging import ALARM, integer_orders, scan
 from .fading import SPEEDS, fadings
@@ -54,7 +53,7 @@ def _of_plant_file(plant: Measured, weak: Weak) -> float:
 def _of_lines(plant: Measured, weak: Weak) -> float:
     """λ, λ² = A n / J, beside an angle-locked torque A sin nθ. [1/s]"""
     orders = integer_orders(weak)
-    if isinstance(plant.plant, LinearAxis) or len(orders) == 0:
+    if plant.plant.is_linear or len(orders) == 0:
         return 0.0
     found = scan(weak, orders, max_lines=2)
     stiffness = max((float(np.hypot(*p)) * n for n, p in zip(found.orders, found.parts, strict=True)), default=0.0)

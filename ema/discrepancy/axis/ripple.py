@@ -16,7 +16,6 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from ema.core.records import Array, Cycle
-from ema.models.axis_config import LinearAxis
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -74,7 +73,7 @@ def _lines(theta: Array, w: Array, highest: int) -> Array:
 
 def describe(plant: AxisPlant) -> Iterator[str]:
     """A sentence for each record under a constant voltage whose speed ripples."""
-    if isinstance(plant.plant, LinearAxis):
+    if plant.plant.is_linear:
         return
     for bench, record in zip(plant.benches, plant.records, strict=True):
         found = [

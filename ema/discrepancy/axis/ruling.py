@@ -10,7 +10,7 @@ what is shorter than its test functions, as the end of a reversal.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from ema.discrepancy import findings as shared
 from ema.discrepancy.folds import Folds
 from ema.discrepancy.grade import NAMED, UPPER, Left
 from ema.discrepancy.outcome import Outcome
-from ema.models.axis_config import LinearAxis
 
 from .balance.as_effects import effects, point
 from .balance.found import Balance, draw
@@ -77,24 +76,25 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
     return None
 
 
-def gain(b: Balance, left: Left, outcome: Outcome, linear: bool) -> dict[str, Any]:
-    """Fields of `findings.Gain` as the balance has them."""
-    folds, numbers = left.error, point(b, linear=linear)
-    return {
-        "train_before": folds.err_before,
-        "train_after": float(np.sqrt(np.mean(b.model.left**2) / b.drive)),
-        "heldout_before": folds.err_before,
-        "heldout_after": folds.err_after,
-        "noise_floor": folds.noise_floor,
-        "k_before": tuple(outcome.k_before),
-        "k_after": tuple(numbers.get(name, k) for name, k in zip(outcome.base, outcome.k_after, strict=True)),
-        "k_names": tuple(outcome.base),
-        "what": f"held-out error of the balance over the drive's {'force' if linear else 'torque'}",
-        "scale": 100.0,
-        "unit": "%",
-        "folds": folds,
-        "residual": folds,
-    }
+def gain(plant: AxisPlant, b: Balance, left: Left, outcome: Outcome) -> shared.Gain:
+    """The gain as the balance has it."""
+    folds, linear = left.error, plant.plant.is_linear
+    numbers = point(b, linear=linear)
+    return shared.Gain(
+        folds.err_before,
+        float(np.sqrt(np.mean(b.model.left**2) / b.drive)),
+        folds.err_before,
+        folds.err_after,
+        folds.noise_floor,
+        tuple(outcome.k_before),
+        tuple(numbers.get(name, k) for name, k in zip(outcome.base, outcome.k_after, strict=True)),
+        k_names=tuple(outcome.base),
+        what=f"held-out error of the balance over the drive's {'force' if linear else 'torque'}",
+        scale=100.0,
+        unit="%",
+        folds=folds,
+        residual=folds,
+    )
 
 
 def _measure_left(plant: AxisPlant, b: Balance) -> Left:
@@ -144,7 +144,7 @@ def _is_refuted(plant: AxisPlant, outcome: Outcome, b: Balance) -> bool:
     if not all(effects(b, term) for term in b.terms):
         return True
     blocks = range(len(plant.blocks))
-    numbers = {**outcome.point, **point(b, linear=isinstance(plant.plant, LinearAxis))}
+    numbers = {**outcome.point, **point(b, linear=plant.plant.is_linear)}
     here, there = (
         float(np.mean(np.concatenate([np.clip(r, -20.0, 20.0).ravel() ** 2 for r in plant.residuals([p], blocks)[0]])))
         for p in (outcome.point, numbers)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.effects.search import AxisSizes
-from ema.models.axis_config import LinearAxis
 
 if TYPE_CHECKING:
     from .measured import Measured
@@ -53,7 +52,7 @@ def sizes(plant: Measured) -> AxisSizes:
         driven_by=p.drive,
         outputs=frozenset(name for b in plant.benches for name in b.roles.outputs),
         fitted=frozenset(p.fitted),
-        turns=not isinstance(p, LinearAxis),
+        turns=not p.is_linear,
         moves=any(not w.static for w in plant.windows),
         warms=bool(np.ptp([w.dT for w in plant.windows]) > WARMING),
         is_force=p.is_force,

@@ -15,7 +15,6 @@ from ema.discrepancy.progress import Progress
 from ema.discrepancy.report import Picture
 from ema.effects import registry
 from ema.models import axis_config
-from ema.models.axis_config import LinearAxis
 
 from . import ripple, stamps
 from .agreeing import merge
@@ -78,7 +77,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     if rules is not None and plant.balance is not None:
         found, verdict = rules.effects, grade(rules.left, named=bool(rules.effects))
         by_balance: Balance | None = plant.balance
-        gain = shared.Gain(**of_balance(plant.balance, rules.left, outcome, isinstance(plant.plant, LinearAxis)))
+        gain = of_balance(plant, plant.balance, rules.left, outcome)
         notes, structure = [rules.note, *(note for note in notes if note in SAID.values())], {}
     else:
         follows = outcome.folds.noise_floor <= WITNESS
@@ -116,7 +115,7 @@ def _rejected(plant: AxisPlant, outcome: Outcome, named: set[str]) -> list[dict[
 
 def _balance(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
     """The regression on the balance; empty where no stretch of motion is long enough."""
-    found, linear = plant.balance, isinstance(plant.plant, LinearAxis)
+    found, linear = plant.balance, plant.plant.is_linear
     if found is None:
         return {}
     out = describe(found, linear=linear)
@@ -139,7 +138,7 @@ def _balance(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
 
 def _by_balance(plant: AxisPlant, b: Balance) -> dict[str, Any]:
     """Base parameters as the balance has them, where it adds effects that free runs had terms without a name for."""
-    own = point(b, linear=isinstance(plant.plant, LinearAxis))
+    own = point(b, linear=plant.plant.is_linear)
     kept = ["F_d", *(name for name in ("J", "M", "C") if name in plant.plant.fitted)]
     return {name: float(f"{own[name]:.6g}") for name in kept if name in own}
 
@@ -149,7 +148,7 @@ def _moved(plant: AxisPlant, outcome: Outcome) -> list[str]:
     before, after, error = plant.plant.F_d, outcome.point["F_d"], outcome.k_error[outcome.base.index("F_d")]
     if abs(after - before) < max(3.0 * error, MOVED * before):
         return []
-    unit = "N" if isinstance(plant.plant, LinearAxis) else "N m"
+    unit = "N" if plant.plant.is_linear else "N m"
     text = f"dry friction was fitted as {after:.3g} {unit}, the plant file says {before:.3g}"
     if outcome.mimicked:
         how = dict.fromkeys(registry()[name].separated_by for name in outcome.mimicked)
@@ -162,16 +161,8 @@ def _effect(e: dict[str, Any]) -> shared.FoundEffect:
     parameters = {name: shared.Quantity(**q) for name, q in e["parameters"].items()}
     others = tuple(e["indistinguishable_from"])
     place = registry()[e["name"]].place if e["name"] in registry() else "plant"
-    return shared.FoundEffect(
-        e["name"],
-        e["confidence"],
-        others,
-        parameters,
-        e["sentence"],
-        e["separated_by"],
-        place,
-        of_others=e["of_others"],
-    )
+    said = (e["sentence"], e["separated_by"])
+    return shared.FoundEffect(e["name"], e["confidence"], others, parameters, *said, place, of_others=e["of_others"])
 
 
 def _kinds(plant: AxisPlant) -> list[str]:

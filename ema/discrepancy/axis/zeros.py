@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ema.models.axis_config import LinearAxis
-
 from .cogging import integer_orders, scan
 from .overlap import between
 from .weak_form import FEWEST, weak_form
@@ -20,7 +18,7 @@ if TYPE_CHECKING:
 
 def zeros(plant: Measured) -> dict[str, Zero]:
     """By record, beside the first one that shows such a torque; empty for one record or a linear axis."""
-    if len(plant.benches) < 2 or isinstance(plant.plant, LinearAxis):
+    if len(plant.benches) < 2 or plant.plant.is_linear:
         return {}
     lines = {b.name: _lines(plant, b.name) for b in plant.benches if b.roles.position is not None}
     if not lines:

@@ -10,7 +10,7 @@ import pytest
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator import telling
 from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.examination import Examination
+from ema.discrepancy.actuator.examine import Examination
 from ema.discrepancy.actuator.features import features, slices
 from ema.discrepancy.actuator.model import Model
 from ema.discrepancy.actuator.noise import Verdict

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,10 +48,10 @@ def find_alternatives(b: Balance, term: Term) -> Effects:
 
 
 def _of_law(b: Balance, law: Law, own: Array) -> Effects:
-    make, F_d = _MAKERS.get(law.name), friction(b)
-    if make is None or (F_d <= 0.0 and make in _RELATIVE):
+    maker, F_d = _MAKERS.get(law.name), friction(b)
+    if maker is None or (F_d <= 0.0 and maker.is_relative):
         return {}
-    return make(law.values(own), F_d, b.plain.k_t)
+    return maker.make(law.values(own), F_d, b.plain.k_t)
 
 
 def friction(b: Balance) -> float:
@@ -85,27 +86,21 @@ def point(b: Balance, *, linear: bool) -> Point:
     return out
 
 
-_Maker = Callable[[Values, float, float], Effects]
+@dataclass(frozen=True)
+class _Maker:
+    """What makes an effect of a law's values, dry friction and torque per ampere; `is_relative`: over dry friction."""
+
+    make: Callable[[Values, float, float], Effects]
+    is_relative: bool = False
 
 
 def _as_it_is(name: str, *parameters: str) -> _Maker:
-    return lambda v, _, __: {name: {p: v[p] for p in parameters}}
+    return _Maker(lambda v, _, __: {name: {p: v[p] for p in parameters}})
 
 
-def _load_friction(v: Values, F_d: float, k_t: float) -> Effects:
-    return {"load_friction": {"per_torque": v["share"] / F_d}}
-
-
-def _friction_slope(v: Values, F_d: float, k_t: float) -> Effects:
-    return {"friction_slope": {"slope": v["slope"] / F_d, "centre": v["centre"]}}
-
-
-def _stribeck(v: Values, F_d: float, k_t: float) -> Effects:
-    return {"stribeck": {"excess": v["more"] / F_d, "speed": v["speed"], "shape": v["shape"]}}
-
-
-def _stretch(v: Values, F_d: float, k_t: float) -> Effects:
-    return {"position_friction": {"height": v["more"] / F_d, "centre": v["centre"], "width": v["width"]}}
+def _of_friction(name: str, parameter: str, of: str, *beside: str) -> _Maker:
+    """`parameter` is the law's value `of` over dry friction; what is `beside` is as it is."""
+    return _Maker(lambda v, F_d, _: {name: {parameter: v[of] / F_d, **{p: v[p] for p in beside}}}, is_relative=True)
 
 
 def _friction_drift(v: Values, F_d: float, k_t: float) -> Effects:
@@ -126,45 +121,33 @@ def _viscous_by_temperature(v: Values, F_d: float, k_t: float) -> Effects:
     return {"viscous_by_temperature": {"per_kelvin": k if C > 0.0 else -k, "coefficient": abs(C)}}
 
 
-def _quadratic_load_friction(v: Values, F_d: float, k_t: float) -> Effects:
-    return {"quadratic_load_friction": {"per_square": v["per_torque"] / F_d}}
-
-
 def _spring(v: Values, F_d: float, k_t: float) -> Effects:
     k = v["stiffness"]
     return {"spring_load": {"stiffness": k}, "constant_load": {"torque": -k * v["zero"]}}
 
 
-def _unequal(v: Values, F_d: float, k_t: float) -> Effects:
-    return {"drive_unequal": {"per_ampere": v["share"] * k_t}}
-
-
-_RELATIVE: tuple[_Maker, ...] = (
-    *(_load_friction, _quadratic_load_friction, _friction_slope, _stribeck, _stretch),
-    *(_friction_drift, _friction_by_temperature),
-)
 _MAKERS: Mapping[str, _Maker] = {
     "viscous_by_direction": _as_it_is("viscous_by_direction", "difference"),
     "pendulum": _as_it_is("pendulum", "amplitude", "phase", "turns"),
     "output_load_friction": _as_it_is("output_load_friction", "share"),
     "quadratic_output_load_friction": _as_it_is("quadratic_output_load_friction", "per_torque"),
-    "quadratic_load_friction": _quadratic_load_friction,
+    "quadratic_load_friction": _of_friction("quadratic_load_friction", "per_square", "per_torque"),
     "friction_memory": _as_it_is("friction_memory", "deflection"),
     "magnet_flux": _as_it_is("magnet_flux", "per_kelvin"),
-    "friction_drift": _friction_drift,
-    "viscous_drift": _viscous_drift,
-    "friction_by_temperature": _friction_by_temperature,
-    "viscous_by_temperature": _viscous_by_temperature,
+    "friction_drift": _Maker(_friction_drift, is_relative=True),
+    "viscous_drift": _Maker(_viscous_drift),
+    "friction_by_temperature": _Maker(_friction_by_temperature, is_relative=True),
+    "viscous_by_temperature": _Maker(_viscous_by_temperature),
     "viscous_slope": _as_it_is("viscous_slope", "slope", "centre"),
     "quadratic_drag": _as_it_is("quadratic_drag", "coefficient"),
     "constant_load": _as_it_is("constant_load", "torque"),
     "cogging": _as_it_is("cogging", "amplitude", "order", "phase"),
     "gear_error": _as_it_is("gear_error", "amplitude", "order", "phase"),
-    "load_friction": _load_friction,
-    "friction_slope": _friction_slope,
-    "stribeck": _stribeck,
-    "position_friction": _stretch,
-    "spring_load": _spring,
+    "load_friction": _of_friction("load_friction", "per_torque", "share"),
+    "friction_slope": _of_friction("friction_slope", "slope", "slope", "centre"),
+    "stribeck": _of_friction("stribeck", "excess", "more", "speed", "shape"),
+    "position_friction": _of_friction("position_friction", "height", "more", "centre", "width"),
+    "spring_load": _Maker(_spring),
     "stiffening_spring": _as_it_is("stiffening_spring", *(p.name for p in EFFECT.parameters)),
-    "drive_unequal": _unequal,
+    "drive_unequal": _Maker(lambda v, _, k_t: {"drive_unequal": {"per_ampere": v["share"] * k_t}}),
 }
