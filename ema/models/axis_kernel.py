@@ -175,7 +175,7 @@ def beyond_after(z, mode, between, t, theta, drive, h_max, theta_b, w_b):
     inertia = z[J] * (1.0 + z[INERTIA])
     gain, R_now = 1.0 / (1.0 + z[GAIN]), max(z[R] * resistance_factor(z, 0, 1, z[DT]), 1e-9)
     for k in range(t.shape[0] - 1):
-        span = t[k + 1] - t[k]
+        span = (t[k + 1] - t[k]) * (1.0 + z[SKEW])
         n_steps = max(1, math.ceil(span / h_max - 1e-9))
         h = span / n_steps
         stiffness, damping, J_b, drag, rubbing, is_driven = gear(z, inertia, h)

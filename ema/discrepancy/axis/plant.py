@@ -288,11 +288,15 @@ class AxisPlant:
             t, theta, speed = (x[k:] for x in (w.part.t, w.part.position, w.part.speed))
             starts[place, 0] = theta[0] if late_theta == 0.0 else np.interp(t[0] + late_theta, t, theta)
             starts[place, 1] = speed[0] if late_w == 0.0 else np.interp(t[0] + late_w, t, speed)
+        derived = pack.bench.roles.speed is None
+        starts[:, :2] = axis.true_state(model, starts[:, :2], derived=derived)
         if axis.is_flexible(model):
-            history = pack.history(late_theta, n)
-            beyond = axis.beyond_after(model, pack.bench.roles.kind, *history, step, self.between)
+            offsets, t, *measured, drive, follows = pack.history(late_theta, n)
+            theta, w = axis.true_state(model, np.column_stack(measured), derived=derived).T
+            beyond = axis.beyond_after(
+                model, pack.bench.roles.kind, offsets, t, theta, w, drive, follows, step, self.between
+            )
             starts[:, 2:] = starts[:, :2] - beyond
-        starts[:, :2] = axis.true_state(model, starts[:, :2], derived=pack.bench.roles.speed is None)
         return starts
 
     def _bristles(self, pack: Pack, model: axis.Model, n: int) -> Array | None:

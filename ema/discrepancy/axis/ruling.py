@@ -1,10 +1,10 @@
 """The verdict by the balance of torque, where free runs cannot say.
 
-They know no neighbouring axis, and of an axis that creeps between its moves friction in sliding only. And where noise
-alone makes much of the motion in a free run, and they are as good with a law as without it, they are no witness against
-what the balance sees: the verdict is then its own, of held-out blocks of torque, and says so. Where they follow the
-motion to within little and leave noise, the record is adequate whatever small thing the balance holds on to: it smooths
-what is shorter than its test functions, as the end of a reversal.
+They know no neighbouring axis, and of an axis that creeps between its moves friction in sliding only, which shows where
+they miss much of its motion. And where noise alone makes much of the motion in a free run, and they are as good with a
+law as without it, they are no witness against what the balance sees: the verdict is then its own, of held-out blocks of
+torque, and says so. Where they follow the motion to within little and leave noise, the record is adequate whatever
+small thing the balance holds on to: it smooths what is shorter than its test functions, as the end of a reversal.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .plant import AxisPlant
 
 WORSE = 0.1  # of the mean square of the free runs' residual, that a law may add to it and not be refuted by them
-WITNESS = 0.1  # of the motion, that noise may make in free runs which are a witness
+WITNESS = 0.1  # of the motion, that free runs which are a witness may miss, or noise make in them
 NEIGHBOUR = "they know nothing of the neighbouring axis"
 CREEPS = "the axis creeps in {:.0%} of the motion, with friction that is not that of sliding, which is all they know"
 BLIND = "noise makes {:.0%} of the motion in them, and they are no worse with what the balance names than without"
@@ -67,7 +67,7 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
         own = [_of_neighbour(b, b.given[0], _share_of_rest(b, b.given[0]))] if _is_seen(b) else []
         own += [_of_neighbour(b, t.law, b.of_set(t)) for t in b.terms if t.law.name == COUPLED and b.of_set(t) >= NAMED]
         return Ruling([*own, *name_laws(plant, b, find_missing(b, []))], _measure_left(plant, b), NEIGHBOUR)
-    if b.creeps:
+    if b.creeps and outcome.folds.err_after > WITNESS:
         return Ruling(name_laws(plant, b, find_missing(b, [])), _measure_left(plant, b), CREEPS.format(b.creeps))
     is_blind = outcome.verdict == "adequate" and outcome.folds.noise_floor > WITNESS
     named = find_missing(b, []) if is_blind else []

@@ -19,9 +19,11 @@ PARTS = ((1.5, 2.3, 0.3), (0.05, 31.0, 1.1), (0.02, 57.0, 0.4), (0.008, 83.0, 2.
 AT = {"F_d": on_paper.F_D}
 
 
-@pytest.fixture(scope="module")
-def resonating():
-    """J_l a_l = Δ/c + 2 ζ √(J_l/c) dΔ/dt of each sine of the load; the motor is ahead of it by Δ."""
+def motor_and_load(shown=lambda t, theta, w: (t, theta, w)):
+    """J_l a_l = Δ/c + 2 ζ √(J_l/c) dΔ/dt of each sine of the load; the motor is ahead of it by Δ.
+
+    `shown` is what the recorder makes of the motor's time, angle and speed.
+    """
     rng = np.random.default_rng(1)
     t = np.arange(0.0, 4.0, 1e-3)
     J_l = SHARE * on_paper.J
@@ -33,9 +35,15 @@ def resonating():
         theta, w, a = theta + motor.imag, w + (1j * f * motor).imag, a - (f**2 * motor).imag
         inner = inner - J_l * (f**2 * load).imag
     tau = (on_paper.J - J_l) * a + inner + on_paper.C * w + on_paper.F_D * np.sign(w)
+    t, theta, w = shown(t, theta, w)
     true = {"theta_m": theta, "w_m": w, "i_q": tau / on_paper.K_T}
     noisy = {name: x + on_paper.NOISE[name] * rng.standard_normal(len(t)) for name, x in true.items()}
     return on_paper.plant(Cycle(0, {"t": t, **noisy}))
+
+
+@pytest.fixture(scope="module")
+def resonating():
+    return motor_and_load()
 
 
 def test_the_resonance_is_looked_for_where_it_is(resonating):
@@ -47,6 +55,34 @@ def test_the_resonance_is_looked_for_where_it_is(resonating):
     assert all(is_within for name, is_within in within.items() if not name.endswith("friction"))  # that may be none
     without, there = (resonating.residuals([point], on_paper.everywhere(resonating))[0] for point in (AT, AT | start))
     assert sum(float((r**2).sum()) for r in there) < 0.5 * sum(float((r**2).sum()) for r in without)
+
+
+BEYOND = 0.05  # of the sensor's angle, and of the clock
+SHOWN = {
+    "resolver_error.once_sine": lambda t, theta, w: (
+        t,
+        theta + BEYOND * np.sin(theta),
+        w * (1.0 + BEYOND * np.cos(theta)),
+    ),
+    "clock_skew.rate": lambda t, theta, w: (t / (1.0 + BEYOND), theta, w),
+}
+
+
+def left_of_a_window(plant, flaw):
+    """Rms of what the truth leaves of a window, the median of all: friction of a reversal makes more of some."""
+    J_l = SHARE * on_paper.J
+    damping = DAMPING / np.sqrt(1.0 - SHARE)  # of the reduced inertia
+    gear = {"compliance": 1.0 / ((2.0 * np.pi * RESONANCE) ** 2 * J_l), "inertia": J_l, "damping": damping}
+    true = AT | {f"gear_compliance.{name}": x for name, x in gear.items()} | flaw
+    (left,) = plant.residuals([true], on_paper.everywhere(plant))
+    return np.median([np.sqrt(np.mean(r**2)) for r in left])
+
+
+@pytest.mark.parametrize("flaw", SHOWN)
+def test_the_load_begins_where_the_true_motion_of_the_motor_has_brought_it(resonating, flaw):
+    """Nobody measures the load: it is worked out of the motor's motion, less what the recorder makes of that."""
+    left = left_of_a_window(motor_and_load(SHOWN[flaw]), {flaw: BEYOND})
+    assert left == pytest.approx(left_of_a_window(resonating, {}), rel=0.05)
 
 
 def fitted_gear(plant, F_d):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import ModuleType, SimpleNamespace
 
 import pytest
@@ -27,9 +28,9 @@ def plant_of(module, **hidden):
 FITTED = {"J": 0.14, "F_d": 0.25, "C": 0.02}  # as free runs would
 
 
-def as_free_runs_had(verdict, noise=0.5):
-    """As free runs of which noise makes a part of the motion."""
-    return SimpleNamespace(verdict=verdict, point=FITTED, folds=SimpleNamespace(noise_floor=noise))
+def as_free_runs_had(verdict, noise=0.5, missed=0.5):
+    """As free runs of which noise makes a part of the motion, and that miss one."""
+    return SimpleNamespace(verdict=verdict, point=FITTED, folds=SimpleNamespace(noise_floor=noise, err_after=missed))
 
 
 def test_a_law_that_free_runs_are_blind_to_is_named_by_the_balance_which_says_so(short_pendulum):
@@ -56,3 +57,12 @@ def test_free_runs_that_are_worse_with_a_law_refute_it(short_pendulum):
     assert [t.law.name for t in other.balance.terms] == ["pendulum"]
     plant._balances[plant.between] = other.balance  # of another axis
     assert rule_by_balance(plant, as_free_runs_had("adequate")) is None
+
+
+def test_of_an_axis_that_creeps_the_balance_speaks_where_free_runs_miss_the_motion_and_only_there(short_pendulum):
+    plant = plant_of(short_pendulum)
+    plant._balances[plant.between] = replace(plant.balance, creeps=0.4)
+    said = rule_by_balance(plant, as_free_runs_had("explained", noise=0.01, missed=0.5))
+    assert [e.name for e in said.effects] == ["pendulum"]
+    assert "creeps in 40%" in said.note
+    assert rule_by_balance(plant, as_free_runs_had("explained", noise=0.01, missed=0.01)) is None
