@@ -17,6 +17,7 @@ from benchmarks.discrepancy import recorded
 from benchmarks.frozen import bench_seed, commit, seed
 from benchmarks.strata import as_actuator
 from ema.core.names import FAULTS
+from ema.discrepancy.actuator.comparators import take_step, tell_step
 from ema.discrepancy.actuator.conditions import take_recorded_conditions
 from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import split
@@ -44,6 +45,9 @@ def deviations(case: str, s: int) -> dict[str, float]:
     frees = (*K_FREE, *(free(p) for p in cases.case(case).parameters))
     start = {f.name: truth[f.name] + APART * f.step * float(rng.standard_normal()) for f in frees}
     noise = Noise(ema, start)
+    if (step := tell_step(ema, noise, truth, train)) is not None:  # as a search does near the truth
+        take_step(ema, step)
+        noise = Noise(ema, start)
     found = settle(ema, noise, fit(ema, noise, frees, start, train, n_iterations=2), train)
     return {name: (found.point[name] - truth[name]) / sd for name, sd in found.sd.items()}
 

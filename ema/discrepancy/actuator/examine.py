@@ -117,7 +117,7 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
         findings.notes.extend(path.as_well)
     if of_each is not None:
         findings.notes.append(describe(search.plant.data.faults, after.fit.point))
-    findings.notes.extend(_describe_conditions(search, path))
+    findings.notes.extend(_describe_conditions(search.plant))
     findings = add_user_friction(as_stated, plant, findings)
     return Examination(findings, search, path.before, after, path.verdict_before, answer.verdict)
 
@@ -197,16 +197,16 @@ def _write(
     return findings, after
 
 
-def _describe_conditions(search: Search, path: Way) -> list[str]:
+def _describe_conditions(ema: EmaPlant) -> list[str]:
     """What was read from the record and is no flaw of the actuator, in words."""
-    ema, notes = search.plant, []
+    notes = []
     if ema.late:
         side, samples = "late" if ema.late > 0 else "early", "sample" if abs(ema.late) == 1 else "samples"
         notes.append(f"the recorded command is {abs(ema.late)} {samples} {side} against the other channels")
     if ema.data.zero:
         notes.append(f"θ_m/GR and θ_u are {ema.data.zero:.2g} rad apart in the middle of the play")
-    if path.step:
-        notes.append(f"the comparators of the record switch as if evaluated every {1e6 * path.step:g} µs")
+    if ema.step:
+        notes.append(f"the comparators of the record switch as if evaluated every {1e6 * ema.step:g} µs")
     return notes
 
 
