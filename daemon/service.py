@@ -275,10 +275,10 @@ class Service:
     def _submit(self, job: Job) -> None:
         if job.method == ARBITER and self._workers[ARBITER].idle:
             self._asked_ns = job.t_ns
-        if not self._workers[job.method].submit(job):
-            self._health.skipped(job)
-            text = f"{job.method}: cycle {job.cycle} is skipped, the worker is behind"
-            self._log_sink.event(Event(job.t_ns, Level.WARNING, LostJob.SKIPPED, text, job.actuator))
+        if left := self._workers[job.method].submit(job):
+            self._health.skipped(left)
+            text = f"{left.method}: cycle {left.cycle} is skipped, the worker is behind"
+            self._log_sink.event(Event(left.t_ns, Level.WARNING, LostJob.SKIPPED, text, left.actuator))
 
     def _answer_jobs(self, workers: Iterable[Worker]) -> None:
         for worker in workers:

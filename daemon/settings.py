@@ -72,7 +72,9 @@ class DaemonSettings(Settings):
         description="beside another monitor of an actuator: listen, and take over when it is silent",
     )
     pace: float = quantity("s", "frames are collected for so long before they are looked at", 3e-3, ge=0, le=0.1)
-    queue: int = Field(default=8, ge=1, le=1000, description="cycles that may wait for a slower identifier")
+    queue: int = Field(
+        default=8, ge=1, le=1000, description="actuators whose newest cycle may wait for a slower identifier"
+    )
 
     @model_validator(mode="after")
     def _somewhere_to_run(self) -> DaemonSettings:

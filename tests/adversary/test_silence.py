@@ -104,7 +104,7 @@ def test_the_hf_worker_hangs(attack, tell, tmp_path):
     """A real one, stopped by a signal, as by a debugger or a device that does not answer."""
     path = tmp_path / "hf.sock"
     hf = {"monitor": {"slower": {"hf": {"every": "1 s"}}}, "remote": {"hf": str(path)}}
-    daemon = attack(**hf)
+    daemon = attack(**hf)  # a slow machine needs longer than that for one, and is asked for the newest cycle next
     with subprocess.Popen([EMA, "hf-worker", "--config", daemon.config], stderr=subprocess.DEVNULL) as worker:
         try:
             daemon.until(lambda one: one.name == "EstimateHf")

@@ -7,26 +7,53 @@ from types import SimpleNamespace
 from ema_daemon.worker import Worker
 
 
-def job(cycle):
-    return SimpleNamespace(cycle=cycle)
+def job(cycle, actuator=0):
+    return SimpleNamespace(cycle=cycle, actuator=actuator)
 
 
-def test_jobs_are_answered_in_their_order():
-    worker = Worker(lambda j: -j.cycle, 10, "test")
-    for cycle in range(5):
-        assert worker.submit(job(cycle))
-    assert [(j.cycle, answer) for j, answer in worker.close(time.monotonic() + 10)] == [(n, -n) for n in range(5)]
+def cycles(answers):
+    return [done.cycle for done, _ in answers]
+
+
+def busy(gate, size=8):
+    """A worker that has begun a job of actuator 9 and ends it when `gate` is set."""
+    begun = threading.Event()
+    worker = Worker(lambda j: begun.set() or gate.wait(10), size, "test")
+    assert worker.submit(job(0, 9)) is None
+    assert begun.wait(10)
+    return worker
+
+
+def test_actuators_are_answered_in_their_order():
+    gate = threading.Event()
+    worker = busy(gate)
+    for actuator in (3, 1, 2):
+        assert worker.submit(job(actuator, actuator)) is None
+    gate.set()
+    assert cycles(worker.close(time.monotonic() + 10)) == [0, 3, 1, 2]
     assert worker.idle
 
 
-def test_a_full_queue_refuses_instead_of_waiting():
+def test_a_newer_cycle_takes_the_place_of_one_that_waits():
+    """A worker that was held up goes on with the present; what is not done for it is said."""
     gate = threading.Event()
-    worker = Worker(lambda j: gate.wait(10), 2, "test")
-    accepted = [worker.submit(job(n)) for n in range(6)]
-    assert accepted[:2] == [True, True]
-    assert accepted[-1] is False
+    worker = busy(gate)
+    left = [worker.submit(job(cycle)) for cycle in range(1, 5)]
+    assert [one and one.cycle for one in left] == [None, 1, 2, 3]
+    assert worker.submit(job(1, 1)) is None
+    assert worker.submit(job(5)).cycle == 4
     gate.set()
-    assert len(worker.close(time.monotonic() + 10)) == accepted.count(True)
+    assert cycles(worker.close(time.monotonic() + 10)) == [0, 5, 1]
+    assert worker.idle
+
+
+def test_a_job_for_which_there_is_no_room_is_not_done():
+    gate = threading.Event()
+    worker = busy(gate, 2)
+    left = [worker.submit(job(cycle, cycle)) for cycle in range(1, 5)]
+    assert [one and one.cycle for one in left] == [None, None, 3, 4]
+    gate.set()
+    assert cycles(worker.close(time.monotonic() + 10)) == [0, 1, 2]
 
 
 def test_an_error_is_an_answer():
