@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import os
+import subprocess
+import zlib
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the daemon: on thirty equations threads only spin
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -49,6 +53,37 @@ class Beside(LoadScopeScheduling):
         if nodeid.startswith("tests/adversary/"):
             return nodeid.split("::")[0]
         return nodeid if nodeid.startswith("tests/discrepancy/") else "one by one"
+
+
+SHARE = 8  # `--searches drawn`: one in so many of the further searches, others with each commit
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--searches",
+        choices=("few", "drawn", "all"),
+        default="all",
+        help="tests marked `further`: none, all, or those that the commit draws",
+    )
+
+
+def pytest_collection_modifyitems(config, items):
+    """Every further search is run with some commit, without each commit waiting for all."""
+    how = config.getoption("--searches")
+    if how == "all":
+        return
+    left = [item for item in items if item.get_closest_marker("further") and not (how == "drawn" and _is_drawn(item))]
+    items[:] = [item for item in items if item not in left]
+    config.hook.pytest_deselected(items=left)
+
+
+@functools.cache
+def _commit() -> bytes:
+    return subprocess.check_output(["git", "rev-parse", "HEAD"], cwd=Path(__file__).parent).strip()
+
+
+def _is_drawn(item) -> bool:
+    return zlib.crc32(_commit() + item.nodeid.encode()) % SHARE == 0
 
 
 def pytest_xdist_make_scheduler(config, log):

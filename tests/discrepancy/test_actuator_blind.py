@@ -38,6 +38,7 @@ def test_neither_nothing_nor_a_fault_is_an_effect(hidden, shipped_plant, k):
         assert found == pytest.approx(k.get(f"k{j + 1}", 0.0), abs=0.006)
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_three_unequal_shorts_are_told_with_the_magnet_that_would_do_as_well(hidden, shipped_plant):
     """As many causes either way, and comparators on a finer grid hide what tells them apart: the answer names both."""
@@ -50,6 +51,7 @@ def test_three_unequal_shorts_are_told_with_the_magnet_that_would_do_as_well(hid
     assert any("what k3 and k4 and k5 have in common, magnet flux changed by" in note for note in findings.notes)
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_a_motion_that_was_recorded_once_is_held_out(hidden, shipped_plant):
     """Two motions, one cycle each: what one says of the faults holds on the other."""
@@ -60,6 +62,7 @@ def test_a_motion_that_was_recorded_once_is_held_out(hidden, shipped_plant):
     assert findings.gain.k_before[0] == pytest.approx(0.04, abs=0.006)
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_a_torque_line_at_no_integer_order_is_not_called_cogging(hidden, shipped_plant):
     findings = examine(shipped_plant, prepare(shipped_plant, [hide(hidden, line=0.01, line_order=7.37)])).findings
@@ -107,6 +110,7 @@ def test_what_another_bench_does_with_the_currents_is_named_and_the_fault_stays(
     assert findings.gain.heldout_after < 1.2 * findings.gain.noise_floor
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_a_magnet_that_weakens_as_the_winding_warms_is_told_per_kelvin(hidden, shipped_plant):
     """The first cycle is the coldest and shows nothing of it; the warmest are held out."""
@@ -126,6 +130,7 @@ def test_a_magnet_that_weakens_as_the_winding_warms_is_told_per_kelvin(hidden, s
     assert findings.gain.heldout_after < 1.2 * findings.gain.noise_floor
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_unequal_sensors_beside_a_resolver_error_are_no_shorts_and_no_magnet(hidden, shipped_plant):
     """Sensors that all read too low look like shorts of all phases: the simpler cause is named, the other told."""
@@ -141,6 +146,7 @@ def test_unequal_sensors_beside_a_resolver_error_are_no_shorts_and_no_magnet(hid
     assert findings.gain.k_after == pytest.approx((0.0, 0.0, 0.0, 0.0, 0.0, 0.03), abs=0.005)
 
 
+@pytest.mark.further
 @pytest.mark.slow
 @pytest.mark.parametrize("flaw", [{"load": 1.8}, {"asymmetry": -0.2}], ids=["load", "friction"])
 def test_a_load_and_friction_that_knows_directions_come_as_a_set(hidden, shipped_plant, flaw):
@@ -152,6 +158,7 @@ def test_a_load_and_friction_that_knows_directions_come_as_a_set(hidden, shipped
     assert found.separated_by
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_what_is_alike_only_beside_what_is_found_is_a_rival(hidden, shipped_plant):
     """By probes without faults and inertia a constant load seemed unlike friction that knows directions."""
@@ -171,6 +178,7 @@ def test_what_is_alike_only_beside_what_is_found_is_a_rival(hidden, shipped_plan
     assert {"constant_load", "asymmetric_friction"} <= near
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_a_heavier_rotor_beside_drag_is_no_weaker_magnet_for_sure(hidden, shipped_plant):
     """Less torque for the same current and more of all that it works against are one: either comes with the other.
@@ -194,6 +202,7 @@ def test_a_heavier_rotor_beside_drag_is_no_weaker_magnet_for_sure(hidden, shippe
     assert beside["inertia"].fit.point["k1"] == pytest.approx(0.057, abs=3e-3)
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_what_was_chosen_first_is_exchanged_where_a_rest_is_left(hidden, shipped_plant):
     """Without Stribeck's friction quadratic drag had done more than the viscous drag that is there; it had stayed."""
@@ -217,6 +226,7 @@ def test_what_was_chosen_first_is_exchanged_where_a_rest_is_left(hidden, shipped
     assert found.fit.point["viscous_drag.coefficient"] == pytest.approx(7.7e-5, rel=0.02)
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_a_gear_that_gives_is_measured_though_its_user_swings_when_cycles_begin(hidden, shipped_plant):
     """Without the user's exact start the truth itself had left a misfit of 800, and the fit ended 16 % off."""
@@ -231,6 +241,7 @@ def test_a_gear_that_gives_is_measured_though_its_user_swings_when_cycles_begin(
     assert findings.gain.heldout_after < 1.2 * findings.gain.noise_floor
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_dead_time_is_promising_beside_what_hides_its_threshold(hidden, shipped_plant):
     """It acts at once where a current is small; first order promised 6 % of what is left, and it was not tried."""
@@ -252,6 +263,7 @@ def test_dead_time_is_promising_beside_what_hides_its_threshold(hidden, shipped_
     assert rank_by_simulation(search, found, rank_to_first_order(search, found))[0].candidate.effect == "dead_time"
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_sensors_that_read_alike_are_no_lighter_rotor_behind_a_ridge(hidden, shipped_plant):
     """A fit that faults had led to gains of 7 % stayed there, with inertia 8 deviations off; p was 0.008."""
@@ -299,6 +311,7 @@ def test_cycles_that_differ_for_want_of_an_effect_have_no_faults_of_their_own(hi
     assert path.after.names == ("constant_load",)
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_another_first_effect_is_tried_where_nothing_explains_the_record(hidden, shipped_plant):
     """Commutation that is off by 5° promised 8 % to first order, cogging that follows it 28 %: "unexplained"."""

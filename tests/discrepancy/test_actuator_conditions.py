@@ -135,7 +135,13 @@ def test_a_user_that_still_swings_starts_with_its_speed(hidden, shipped_plant):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flaws", [{"k3": 0.05}, {"k3": 0.05, "viscous": 6e-5}], ids=["faults", "drag"])
+@pytest.mark.parametrize(
+    "flaws",
+    [
+        pytest.param({"k3": 0.05}, id="faults"),
+        pytest.param({"k3": 0.05, "viscous": 6e-5}, id="drag", marks=pytest.mark.further),
+    ],
+)
 def test_comparators_ten_times_as_coarse_are_a_condition_and_no_cause(hidden, shipped_plant, flaws):
     """Another simulator evaluates them every 10 µs: currents overshoot the band, which is no flaw of the actuator."""
     bench = hidden.Bench(substeps=10)
@@ -169,7 +175,13 @@ def test_sound_sensors_and_a_gear_that_gives_have_no_zeros_apart(hidden, shipped
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flaws", [{"k1": 0.04, "k3": 0.03}, {"k3": 0.03, "viscous": 6e-5}], ids=["faults", "drag"])
+@pytest.mark.parametrize(
+    "flaws",
+    [
+        pytest.param({"k1": 0.04, "k3": 0.03}, id="faults"),
+        pytest.param({"k3": 0.03, "viscous": 6e-5}, id="drag", marks=pytest.mark.further),
+    ],
+)
 def test_a_simulation_without_any_noise_is_a_record_too(hidden, shipped_plant, flaws):
     """Runs without noise of the position switch in step with each other, but not with another simulator's."""
     findings = examined(hidden, shipped_plant, hidden.Bench(current_noise=0.0, lvdt_noise=0.0), **flaws)
@@ -187,6 +199,7 @@ def test_a_zero_of_the_position_sensor_is_a_condition_and_no_cause(hidden, shipp
     assert findings.gain.k_after == pytest.approx((0.04, 0.0, 0.03, 0.0, 0.0, 0.0), abs=3e-3)
 
 
+@pytest.mark.further
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("angle", "apart"), [(0.05, 0.0), (-0.075, 0.0), (0.05, 0.05)], ids=["resolver", "resolver, back", "drive"]
@@ -212,7 +225,13 @@ def test_the_torque_tells_a_small_commutation_offset_from_a_zero_of_the_position
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flaws", [{"k1": 0.04, "k3": 0.03}, {"k3": 0.03, "viscous": 6e-5}], ids=["faults", "drag"])
+@pytest.mark.parametrize(
+    "flaws",
+    [
+        pytest.param({"k1": 0.04, "k3": 0.03}, id="faults"),
+        pytest.param({"k3": 0.03, "viscous": 6e-5}, id="drag", marks=pytest.mark.further),
+    ],
+)
 def test_a_recorder_with_the_command_a_sample_late_is_a_condition_and_no_cause(hidden, shipped_plant, flaws):
     findings = examined(hidden, shipped_plant, hidden.Bench(command_late=1), **flaws)
     assert [e.name for e in findings.effects] == ["viscous_drag"] * ("viscous" in flaws)

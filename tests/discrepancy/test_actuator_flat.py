@@ -36,6 +36,7 @@ def test_shorts_and_gains_are_told_apart_and_the_intervals_say_how_well(hidden, 
         assert 2.0 * found.sd[name] < value  # shorts are still told from none
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_a_weaker_magnet_is_found_behind_the_minima_between(hidden, shipped_plant):
     """What pattern the currents run through changes all along: steps downhill end in a minimum on the way."""

@@ -55,6 +55,7 @@ def told_ranges(findings):
     return {name: (float(low), float(high)) for name, low, _, high in words}
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_faults_that_grow_are_no_flaw_of_the_simulation_and_not_the_temperatures(hidden, shipped_plant):
     cycles = warming(hidden, (20.0, 35.0, 45.0, 50.0), *(hidden.Flaws(k1=0.02 * n, k3=0.03 * n) for n in range(4)))
@@ -64,6 +65,7 @@ def test_faults_that_grow_are_no_flaw_of_the_simulation_and_not_the_temperatures
     assert set(told_ranges(findings)) == {"k1", "k3"}
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_a_magnet_that_weakens_with_the_temperature_is_told_from_a_short_that_grows_with_it(hidden, shipped_plant):
     temperatures = (20.0, 32.0, 43.0, 50.0)
@@ -92,6 +94,7 @@ def test_an_effect_is_named_from_the_bus_too(hidden, shipped_plant):
     assert findings.effects[0].parameters["coefficient"].value == pytest.approx(6e-5, rel=0.02)
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_effects_are_named_beside_faults_that_grow(hidden, shipped_plant):
     """Faults of each cycle stand for the drag too, at first; what grows is told as it does beside the drag."""

@@ -94,6 +94,7 @@ def test_a_constant_load_and_unequal_friction_are_one_while_the_axis_slides(axis
     assert found["confidence"] < 0.9
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_a_line_of_no_whole_order_is_unexplained_with_its_order(axis_bench, hidden_axis):
     outcome, truth = look(axis_bench, hidden_axis, ["odd_line"], 1)

@@ -48,6 +48,7 @@ def test_a_speed_that_repeats_the_encoder_is_no_channel_of_its_own(axis_other):
     assert plant.benches[0].noise["theta_m"].sigma == pytest.approx(setup.counts / 12**0.5, rel=0.05)
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_drag_of_a_force_driven_mass_is_named_from_its_position_alone(axis_other):
     found = look(axis_other, "stage", VISCOUS=10.0).effects[0]
@@ -65,6 +66,7 @@ def test_a_drive_that_is_held_between_samples_is_a_condition_and_no_late_sensor(
     assert any("held until the next" in note for note in outcome.notes)
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_an_effect_far_above_the_noise_does_not_hide_that_the_drive_is_held(axis_other):
     outcome = look(axis_other, "stage", held=True, VISCOUS=10.0)
@@ -82,6 +84,7 @@ def test_what_pulls_once_per_turn_may_be_a_weight(axis_other):
     assert "unbalanced load" in found["sentence"]
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_a_constant_force_is_one_with_unequal_friction_and_with_an_offset_of_the_force_sensor(axis_other):
     found = look(axis_other, "stage", CONSTANT=1.5).effects[0]
@@ -113,6 +116,7 @@ def test_friction_that_falls_fast_with_speed_is_named_though_motion_cannot_be_fo
 SLOW = ((12, 0.5, 0), (30, 1.3, 0), (25, 0.7, -12))
 
 
+@pytest.mark.further
 @pytest.mark.slow
 @pytest.mark.parametrize(("own", "name"), [(True, "encoder_error"), (False, "resolver_error")])
 def test_an_angle_sensor_off_centre_is_told_with_or_without_a_speed_sensor_of_its_own(axis_other, own, name):

@@ -36,6 +36,7 @@ def strongest_line(outcome):
     return max(lines, key=lambda p: p["amplitude"]["value"])
 
 
+@pytest.mark.further
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["standstill", "speed_loop"])
 def test_cogging_of_the_same_order_and_size_is_found_at_standstill_and_in_motion(name):
@@ -58,6 +59,7 @@ def test_the_sine_shows_the_speed_signals_delay_and_a_torque_constant_is_conside
     assert outcome.records[0].rms_after < 0.6 * outcome.records[0].rms_before
 
 
+@pytest.mark.further
 @pytest.mark.slow
 def test_rolling_at_one_speed_names_nothing_and_tells_what_was_considered():
     outcome = look("rolling")

@@ -29,6 +29,7 @@ def outcome():
     return examine_ways(AxisPlant(model, [Record((Cycle(0, channels),))], n_threads=1))
 
 
+@pytest.mark.further
 def test_a_torque_that_reads_too_much_is_no_heavier_axis(outcome):
     told = {name for e in outcome.effects for name in (e["name"], *e["indistinguishable_from"])}
     assert "drive_gain" in told
