@@ -15,6 +15,7 @@ from ema.models.envelope import envelope
 from ema.models.turns import nearest_turn
 
 from .checks import check_rate, check_signals
+from .clipping import ranges
 from .features import Signals, features, stacked
 from .measured import Measured
 from .resolution import resolution
@@ -82,6 +83,7 @@ def prepare(plant: Actuator, records: Sequence[Record]) -> Measured:
         zero_apart(plant, signals),
         every,
         np.zeros((len(labels), len(FAULTS))),
+        ranges(signals, plant.sensors.adc_step),
     )
 
 

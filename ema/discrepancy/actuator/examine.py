@@ -20,6 +20,7 @@ from ema.identification.alignment import aligned
 from ema.models import actuator_file
 from ema.models.actuator import Actuator
 
+from .clipping import describe as describe_ranges
 from .conditions import take_recorded_conditions
 from .cycles import prepare
 from .entrants import weigh_sets
@@ -199,7 +200,7 @@ def _write(
 
 def _describe_conditions(ema: EmaPlant) -> list[str]:
     """What was read from the record and is no flaw of the actuator, in words."""
-    notes = []
+    notes = describe_ranges(ema.data.ranges)
     if ema.late:
         side, samples = "late" if ema.late > 0 else "early", "sample" if abs(ema.late) == 1 else "samples"
         notes.append(f"the recorded command is {abs(ema.late)} {samples} {side} against the other channels")

@@ -52,6 +52,8 @@ class Measured:
         Samples from one recorded position to the next, where the record holds straight lines between them; else 1.
     faults : array, shape (n_cycles, 6)
         What each cycle's faults differ by from those of the record.
+    ranges : array, shape (n_cycles,)
+        Largest current that a cycle's recorder keeps, infinite unless cycles differ in it. [A]
     """
 
     labels: tuple[str, ...]
@@ -71,6 +73,7 @@ class Measured:
     zero: float
     every: int
     faults: Array
+    ranges: Array
 
     @property
     def n_cycles(self) -> int:

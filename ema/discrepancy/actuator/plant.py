@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -156,6 +157,8 @@ class EmaPlant:
             dt=dt,
             n_threads=self.n_threads,
         )
+        top = d.ranges[cycles_, None, None]
+        r = replace(r, i=np.clip(r.i, -top, top))
         theta_m = r.theta_m
         if d.angle_noise:
             white = [np.random.default_rng([seed, 1]).standard_normal(theta_m.shape[1]) for seed in seeds]

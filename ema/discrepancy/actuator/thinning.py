@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 MOST = 24  # cycles that are examined; with more, the library's own approximations are what is left
-BY_CYCLE = ("motion", "start", "speed", "user_speed", "holding", "dT", "faults")
+BY_CYCLE = ("motion", "start", "speed", "user_speed", "holding", "dT", "faults", "ranges")
 AT_LEAST = 2  # of each motion: one to fit, one to judge
 
 
