@@ -46,7 +46,7 @@ def test_the_actuator(monkeypatch):
     """A record with everything in it: supply, warming, clipped currents, a resonance, a line, a stretch."""
     plant = config.load(resources.config("actuator.yaml"), Actuator)
     signals = SimpleNamespace(u_dc=np.full(100, 28.0), i=np.full((1, 3, 100), 5.0))
-    data = SimpleNamespace(zero=0.0, dT=np.array([0.0, 30.0]), signals=[signals, signals])
+    data = SimpleNamespace(zero=0.0, dT=np.array([0.0, 30.0]), signals=[signals, signals], ranges=np.full(2, np.inf))
     resonance = Resonance(1e-3, 1e-3, damping=0.1, drag=1.0, friction=0.1, k2=0.0, starts=np.zeros((2, 2)))
     monkeypatch.setattr(actuator, "lines", lambda torques: [(18.0, 0.5)])
     monkeypatch.setattr(actuator, "bumps", lambda torques: [(0.01, 1e-3)])
@@ -77,7 +77,7 @@ def test_an_effect_of_a_file_more_is_tried_on_both_plants(monkeypatch, axis_benc
     for module in (actuator, free, axis):
         monkeypatch.setattr(module, "registry", lambda: more)
     signals = SimpleNamespace(u_dc=None, i=np.full((1, 3, 100), 5.0))
-    data = SimpleNamespace(zero=0.0, dT=np.zeros(2), signals=[signals, signals])
+    data = SimpleNamespace(zero=0.0, dT=np.zeros(2), signals=[signals, signals], ranges=np.full(2, np.inf))
     (c,) = [c for c in actuator.candidates(config.load(resources.config("actuator.yaml"), Actuator), data, [])
             if c.effect == "belt_drag"]  # fmt: skip
     (start,) = (p.start for p in belt.parameters)
