@@ -46,6 +46,8 @@ CHANNELS = {
     "v": Channel("m/s", "speed of a linear axis"),
     "force": Channel("N", "force on a linear axis"),
     "torque": Channel("N m", "torque on a rotary axis"),
+    "load_torque": Channel("N m", "torque of a known load on a rotary axis, against positive motion"),
+    "load_force": Channel("N", "force of a known load on a linear axis, against positive motion"),
     "theta_ref": Channel("rad", "commanded angle of an axis"),
     "theta_n": Channel("rad", "angle of the neighbouring axis"),
     "q_ref": Channel("m", "commanded position of a linear axis"),

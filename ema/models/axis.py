@@ -93,6 +93,7 @@ def simulate(
     slide: Array | None = None,
     between: str = "straight",
     bristles: Array | None = None,
+    load: Array | None = None,
 ) -> Array:
     """Outputs (4, n_times) of all windows: position, speed, current, voltage as the sensors show them.
 
@@ -114,6 +115,8 @@ def simulate(
         A speed loop acts once a sample, or (fast) between samples too.
     bristles : array, shape (n_windows,), optional
         Share of dry friction, -1…1, that is built up where a window begins; all of it where not given.
+    load : array, shape (n_times,), optional
+        Torque of a known load against positive motion; straight from sample to sample. [N m or N]
     """
     bristles = np.sign(starts[:, 1]) if bristles is None else bristles
     starts = np.column_stack([starts, bristles])
@@ -121,8 +124,12 @@ def simulate(
     dT = np.zeros(len(starts)) if dT is None else dT
     out = np.empty((len(kernel.OUTPUTS), len(t)))
     model = (numbers.z, numbers.lines, numbers.terms, MODES[drive], BETWEEN[between])
-    kernel.simulate_windows(*model, offsets, t, recorded, starts, slide, dT, h_max, out)
+    kernel.simulate_windows(*model, offsets, t, recorded, _known(load, t), starts, slide, dT, h_max, out)
     return out
+
+
+def _known(load: Array | None, t: Array) -> Array:
+    return np.zeros(len(t)) if load is None else load
 
 
 def lag_of_drive(numbers: Model) -> float:
@@ -140,10 +147,10 @@ def acting_drive(lag: float, t: Array, recorded: Array, between: str = "straight
     return follow(t, recorded, lag, BETWEEN[between]) if lag > 0.0 else recorded
 
 
-def holding(numbers: Model, theta: Array, direction: Array, t: Array) -> Array:
-    """Current that holds the axis at angles `theta`, approached in `direction`, shape of `theta`. [A]"""
+def holding(numbers: Model, theta: Array, direction: Array, t: Array, load: Array | None = None) -> Array:
+    """Current that holds the axis with a known `load` at `theta`, approached in `direction`; of one shape. [A]"""
     out = np.empty(len(theta))
-    kernel.holding_current(numbers.z, numbers.lines, numbers.terms, theta, direction, t, out)
+    kernel.holding_current(numbers.z, numbers.lines, numbers.terms, theta, direction, t, _known(load, t), out)
     return out
 
 
@@ -163,6 +170,7 @@ def beyond_after(
     follows: NDArray[np.bool_],
     h_max: float,
     between: str = "straight",
+    load: Array | None = None,
 ) -> Array:
     """Position and speed of what is beyond a gear, shape (n, 2), at the end of each recorded motion.
 
@@ -174,9 +182,11 @@ def beyond_after(
         Whether a motion begins where the one before it ended; else it begins untwisted, as fast as what is measured.
     """
 
+    known = _known(load, t)
+
     def along(of: slice, beyond: State) -> State:
         how = (numbers.z, MODES[drive], BETWEEN[between])
-        return kernel.beyond_after(*how, t[of], theta[of], recorded[of], h_max, *beyond)
+        return kernel.beyond_after(*how, t[of], theta[of], recorded[of], known[of], h_max, *beyond)
 
     return _after(offsets, follows, lambda first: (theta[first], w[first]), along)
 
@@ -237,9 +247,17 @@ def true_state(numbers: Model, measured: Array, *, derived: bool) -> Array:
 
 
 def torque_along(
-    numbers: Model, theta: Array, w: Array, i: Array, t: Array, dT: Array, *, force: bool = False
+    numbers: Model,
+    theta: Array,
+    w: Array,
+    i: Array,
+    t: Array,
+    dT: Array,
+    load: Array | None = None,
+    *,
+    force: bool = False,
 ) -> Array:
-    """Torque left to accelerate the axis along a measured motion, arrays of one shape. [N m or N]"""
+    """Torque left to accelerate the axis along a measured motion, with a known `load`; of one shape. [N m or N]"""
     out = np.empty(len(theta))
-    kernel.torque_along(numbers.z, numbers.lines, numbers.terms, theta, w, i, t, dT, force, out)
+    kernel.torque_along(numbers.z, numbers.lines, numbers.terms, theta, w, i, t, dT, _known(load, t), force, out)
     return out

@@ -1,6 +1,6 @@
 """The axis model's equations: one inertia or mass from sample to sample of a recorded drive.
 
-    J dω_m/dt = τ_m - C ω_m - τ_friction(ω_m, τ) - τ_effects         τ_m = k_t i  (or the recorded force)
+    J dω_m/dt = τ_m - τ_load - C ω_m - τ_friction(ω_m, τ) - τ_effects     τ_m = k_t i  (or the recorded force)
     L di/dt   = u - R i - k_e ω_m                                    where the voltage drives
     i         = sat(K_w (ω_ref - ω_m,measured), ±I_max)              where the speed loop is simulated
 
@@ -9,7 +9,7 @@ A gear that gives (`gear_compliance`) takes the inertia J_l at the user out of J
     (J - J_l) dω_m/dt = … - T      J_l dω_l/dt = T      T = (θ_m - θ_l)/c + d (ω_m - ω_l)
 
 Where the angle is measured behind the gear (`drive_compliance`), what hangs to the spring is the motor,
-and the drive acts there.
+and the drive acts there. A known load τ_load was recorded, and acts on the side of the user.
 
 Dry friction stays, breaks away, keeps moving and stops, or has a memory (`ema.effects.friction_memory`).
 For a linear axis read position, speed, mass and force; the equations are the same.
@@ -51,7 +51,7 @@ angle_error = combined("angle_error", "axis", row)
 position_error = combined("position_error", "axis", row)
 
 J, C, F_S, F_D, K_T, K_E, R, L = (row(name) for name in ("J", "C", "F_s", "F_d", "k_t", "k_e", "R", "L"))
-K_W, I_MAX, DT = row("K_w"), row("I_max"), row("dT")
+K_W, I_MAX, DT, LOAD = row("K_w"), row("I_max"), row("dT"), row("load")
 INERTIA, GAIN, OFFSET = row("inertia.change"), row("drive_gain.gain"), row("drive_offset.offset")
 DROP, BELOW, ROUNDNESS = (row(f"inverter_drop.{name}") for name in ("voltage", "below", "roundness"))
 SKEW = row("clock_skew.rate")
@@ -69,7 +69,7 @@ SAG, V_DC = row("supply_sag.resistance"), row("V_dc")
 @_inline
 def torques(z, lines, terms, theta, w, i, t):
     """Torques that oppose positive motion besides dry friction.   [N m or N]"""
-    tau = z[C] * w + shaft_torque(z, 0, 1, theta, w, theta, i) + user_torque(z, 0, 1, theta)
+    tau = z[LOAD] + z[C] * w + shaft_torque(z, 0, 1, theta, w, theta, i) + user_torque(z, 0, 1, theta)
     tau += drifting_torque(z, 0, 1, w, t, z[DT])
     for k in range(lines.shape[0]):
         tau += _cogging(theta, w, theta, i, lines[k, 0], lines[k, 1], lines[k, 2])
@@ -170,7 +170,7 @@ def share_then(between, x):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def beyond_after(z, mode, between, t, theta, drive, h_max, theta_b, w_b):
+def beyond_after(z, mode, between, t, theta, drive, load, h_max, theta_b, w_b):
     """Position and speed beyond a gear, given at t[0], at the end of a recorded motion under a recorded drive."""
     inertia = z[J] * (1.0 + z[INERTIA])
     gain, R_now = 1.0 / (1.0 + z[GAIN]), max(z[R] * resistance_factor(z, 0, 1, z[DT]), 1e-9)
@@ -191,6 +191,8 @@ def beyond_after(z, mode, between, t, theta, drive, h_max, theta_b, w_b):
                 if mode == VOLTAGE:
                     u = (u - z[K_E] * emf_factor(z, 0, 1, 0.0, z[DT]) * w_b) / R_now
                 T += u if mode == FORCE else z[K_T] * emf_factor(z, 0, 1, u, z[DT]) * u
+            else:
+                T -= load[k] + x * (load[k + 1] - load[k])
             theta_b += 0.5 * h * w_b
             w_b = rubbing_speed_after(w_b, T - drag * w_b, rubbing, h / J_b)
             theta_b += 0.5 * h * w_b
@@ -212,7 +214,7 @@ def bristle_after(z, theta, play, s, seen):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_max, out):
+def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide, h_max, out):
     """Simulate one window.
 
     Parameters
@@ -227,8 +229,8 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
     between : int
         STRAIGHT, HELD or HELD_BEFORE: from sample to sample the drive runs straight, holds the value of the first, or
         that of the second. A commanded speed is held; its loop acts once a sample, or (FAST) between samples too.
-    t, drive : arrays, shape (n_times,)
-        Sample times and the recorded drive.
+    t, drive, load : arrays, shape (n_times,)
+        Sample times, the recorded drive and the torque of a known load against positive motion.
     start : array, shape (5,)
         Position, speed, by how much what is beyond a gear that gives is behind in both, and the share of friction
         that is built up.
@@ -270,6 +272,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
         for s in range(n_steps):
             x = (s + 0.5) / n_steps
             t_mid = t[k] + x * (t[k + 1] - t[k])
+            z[LOAD] = load[k] + x * (load[k + 1] - load[k])
             if mode == SPEED_LOOP:
                 since = w + 0.5 * dw - out[1, k] if between == FAST else 0.0
                 i = min(max(asked - z[K_W] * since, -z[I_MAX]), z[I_MAX])
@@ -295,7 +298,8 @@ def simulate_window(z, lines, terms, mode, between, t, drive, start, slide, h_ma
             if stiffness > 0.0:
                 T = stiffness * (theta_mid - theta_b - 0.5 * h * w_b) + damping * (w - w_b)
                 tau -= T
-                pull = (T + tau_m if is_driven else T) - drag * w_b
+                tau += 0.0 if is_driven else z[LOAD]
+                pull = T + (tau_m if is_driven else -z[LOAD]) - drag * w_b
                 theta_b += 0.5 * h * w_b
                 dw_b = rubbing_speed_after(w_b, pull, rubbing, h / J_b) - w_b
                 w_b += dw_b
@@ -347,23 +351,23 @@ def _sensors(z, t, skew, slope, out, R_now, mode, drive, gain):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def simulate_windows(z, lines, terms, mode, between, offsets, t, drive, starts, slide, dT, h_max, out):
+def simulate_windows(z, lines, terms, mode, between, offsets, t, drive, load, starts, slide, dT, h_max, out):
     """Simulate windows `offsets[j]:offsets[j + 1]` of the concatenated arrays, each from its own start."""
     for j in range(offsets.shape[0] - 1):
         a, b = offsets[j], offsets[j + 1]
         z[DT] = dT[j]
-        window = (t[a:b], drive[a:b], starts[j], slide[j])
+        window = (t[a:b], drive[a:b], load[a:b], starts[j], slide[j])
         simulate_window(z, lines, terms, mode, between, *window, h_max, out[:, a:b])
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def holding_current(z, lines, terms, theta, direction, t, out):
+def holding_current(z, lines, terms, theta, direction, t, load, out):
     """Current that holds the axis at rest at angles `theta`, each approached in `direction` (±1).   [A, or N]
 
     The holding torque lies at the edge of friction on the side from which the angle was approached.
     """
     for k in range(theta.shape[0]):
-        i = 0.0
+        i, z[LOAD] = 0.0, load[k]
         for _ in range(3):  # the torque constant and load-dependent friction depend on the current they decide
             k_t = z[K_T] * emf_factor(z, 0, 1, i, z[DT])
             _, F_d = friction(z, lines, terms, theta[k], direction[k] * 1e-9, 0.0, k_t * i, i, t[k])
@@ -393,11 +397,11 @@ def undo_angle_error(z, measured, of_position, out):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def torque_along(z, lines, terms, theta, w, i, t, dT, is_force, out):
+def torque_along(z, lines, terms, theta, w, i, t, dT, load, is_force, out):
     """Accelerating torque the model sees along a measured motion: drive less everything that opposes it."""
     bristle = 1.0 if w[0] > 0.0 else -1.0
     for k in range(theta.shape[0]):
-        z[DT] = dT[k]
+        z[DT], z[LOAD] = dT[k], load[k]
         tau_m = i[k] if is_force else z[K_T] * emf_factor(z, 0, 1, i[k], z[DT]) * i[k]
         tau = tau_m - torques(z, lines, terms, theta[k], w[k], i[k], t[k])
         _, F_d = friction(z, lines, terms, theta[k], w[k], tau, tau_m, i[k], t[k])

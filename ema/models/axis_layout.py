@@ -5,7 +5,8 @@ from __future__ import annotations
 from ema.effects import registry
 
 # F_s, F_d: static and sliding friction; V_dc: supply without load; dT: winding temperature less 20 °C
-PARAMETERS = ("J", "C", "F_s", "F_d", "k_t", "k_e", "R", "L", "V_dc", "K_w", "I_max", "dT")
+# load: torque of a known load at the moment, as a record has it
+PARAMETERS = ("J", "C", "F_s", "F_d", "k_t", "k_e", "R", "L", "V_dc", "K_w", "I_max", "dT", "load")
 # Cogging lines are a table of their own, since a motor has several.
 _effects = tuple(
     f"{name}.{p.name}" for name, effect in registry().items() if "axis" in effect.plants for p in effect.parameters

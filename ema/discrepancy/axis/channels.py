@@ -10,7 +10,7 @@ from scipy.signal import correlate, savgol_filter
 
 from ema.core.errors import RecordError
 from ema.core.names import CHANNELS
-from ema.core.records import Array, Record, require
+from ema.core.records import Array, Cycle, Record, require
 from ema.models.axis_config import Axis
 
 MIN_SAMPLES = 40
@@ -19,12 +19,16 @@ ENTERING = 3  # samples before a limit, over which a position shows that it slow
 NOT_SLOWED = 0.4  # of its usual speed
 ONE_SCALE = 1.25  # ratio of the recorded speed to that of the position
 IN_STEP = 0.8  # correlation of the torque that the motion needs with the recorded one
+LOAD_CHANNEL = {False: "load_torque", True: "load_force"}  # of an axis that is linear, or not
 DRIVE_CHANNEL = {"current": "i_q", "voltage": "u_q", "force": "force", "torque": "torque", "speed-loop": "w_ref"}
 
 
 @dataclass(frozen=True)
 class Roles:
-    """Channel names by role; `outputs` are those a simulation is compared with; `kind` is what drives."""
+    """Channel names by role; `outputs` are those a simulation is compared with; `kind` is what drives.
+
+    `load` is that of a known load.
+    """
 
     kind: str
     drive: str
@@ -32,6 +36,7 @@ class Roles:
     speed: str | None
     outputs: tuple[str, ...]
     derived: str | None = None  # a speed that repeats the position
+    load: str | None = None
 
 
 def roles(plant: Axis, record: Record) -> Roles:
@@ -56,14 +61,22 @@ def roles(plant: Axis, record: Record) -> Roles:
         raise RecordError(
             f"{record.name}: the axis does not move ({' and '.join(moving)} constant): nothing to compare"
         )
-    _finite(record, (drive, *outputs))
+    load = LOAD_CHANNEL[plant.is_linear]
+    _finite(record, (drive, *outputs, *([load] if load in have else [])))
     commanded = kind in ("voltage", "speed-loop") or plant.position_loop is not None  # a drive may go to its limit
     _not_clipped(record, tuple(moving) if commanded else (drive, *moving), position)
     if speed in have and position in have:
         _one_scale(record, position, speed)
     if speed in have and kind in ("current", "force"):
         _in_step(plant, record, drive, speed)
-    return Roles(kind, drive, position if position in have else None, speed if speed in have else None, tuple(outputs))
+    return Roles(
+        kind,
+        drive,
+        position if position in have else None,
+        speed if speed in have else None,
+        tuple(outputs),
+        load=load if load in have else None,
+    )
 
 
 def _kind(plant: Axis, record: Record) -> str:
@@ -116,6 +129,7 @@ def _in_step(plant: Axis, record: Record, drive: str, speed: str) -> None:
         smooth = savgol_filter(w, width, 2)
         need = plant.inertia * np.gradient(smooth, t) + plant.C * smooth + plant.F_d * np.sign(smooth)
         given = savgol_filter(cycle[drive], width, 2) * (1.0 if plant.is_force else float(plant.k_t or 1.0))
+        given -= known_load(cycle, LOAD_CHANNEL[plant.is_linear])
         need, given = need - need.mean(), given - given.mean()
         lag = int(np.argmax(correlate(need, given, mode="same"))) - len(need) // 2
         here, there = _alike(need, given, 0), _alike(need, given, lag)
@@ -129,6 +143,11 @@ def _in_step(plant: Axis, record: Record, drive: str, speed: str) -> None:
             f"{record.name}: {speed} runs {abs(shift):.3g} s {'behind' if shift > 0.0 else 'ahead of'} {drive}: the "
             "channels are out of step; record them on one clock"
         )
+
+
+def known_load(cycle: Cycle, channel: str | None) -> Array:
+    """Torque or force of a known load at a cycle's samples, 0 where none was recorded. [N m or N]"""
+    return cycle[channel] if channel is not None and channel in cycle else np.zeros(cycle.n_samples)
 
 
 def _alike(x: Array, y: Array, lag: int) -> float:

@@ -16,6 +16,7 @@ from ema.discrepancy.plant import Point
 from ema.models import axis
 from ema.models.axis_config import PositionLoop
 
+from .channels import LOAD_CHANNEL, known_load
 from .intake import of_loop
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ def _run(
     """Position and drive of one cycle, from its measured start."""
     t, ref = cycle["t"][:MOST], cycle[reference][:MOST]
     w_ref = cycle["w_ref"][:MOST] if "w_ref" in cycle else np.gradient(ref, t)
+    load = known_load(cycle, LOAD_CHANNEL[plant.plant.is_linear])
     supply = cycle["u_dc"] if "u_dc" in cycle else np.full(len(t), plant.plant.V_dc or 1.0)
     theta, given = np.empty(len(t)), np.empty(len(t))
     state, bristle = np.zeros((1, 4)), 0.0
@@ -71,7 +73,8 @@ def _run(
         if k < len(t) - 1:
             drive = np.array([given[k], given[k]])
             window = (offsets, t[k : k + 2], drive, state, step)
-            out = axis.simulate(model, kind, *window, between="held", bristles=np.array([bristle]))
+            bristles, here = np.array([bristle]), load[k : k + 2]
+            out = axis.simulate(model, kind, *window, between="held", bristles=bristles, load=here)
             bristle = axis.built_up(model, bristle, out[0, 1] - state[0, 0])
             state[0, :2] = out[0, 1], out[1, 1]
     return theta, given

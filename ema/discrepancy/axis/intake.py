@@ -2,6 +2,7 @@
 
 ==================================  ==============================================================================
 torque beyond a gear                times or by its ratio, to where position and inertia are
+known load on the user's side       over the gear's ratio where position is measured at the motor
 duty                                times the supply: the voltage
 reference of a position loop        with the drive's gains and the measured motion: what the drive asks for
 enabled                             a current or torque that is off is 0; of a voltage that is off nothing is known
@@ -45,6 +46,8 @@ def _driven(plant: Axis, record: Record) -> Record:
         if plant.drive == "torque" and "torque" in channels and plant.torque_at != plant.measured_at:
             ratio = plant.gear if plant.measured_at == "load" else 1.0 / plant.gear
             channels["torque"] = channels["torque"] * ratio
+        if "load_torque" in channels and plant.measured_at == "motor":
+            channels["load_torque"] = channels["load_torque"] / plant.gear
         if "enabled" in channels and wanted in channels:
             cycles += _enabled(plant, replace(cycle, channels=channels), wanted)
         else:

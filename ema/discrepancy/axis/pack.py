@@ -14,7 +14,7 @@ from ema.models import axis
 from .whitening import Filter, join
 from .windows import Bench, Window
 
-History = tuple[NDArray[np.int64], Array, Array, Array, Array, NDArray[np.bool_]]
+History = tuple[NDArray[np.int64], Array, Array, Array, Array, Array, NDArray[np.bool_]]
 MEMORY = 1.0  # [s] for which what is beyond a gear is followed before a window
 
 
@@ -26,15 +26,16 @@ class LedIn:
     offsets: NDArray[np.int64]
     t: Array
     drive: Array
+    load: Array
     own: NDArray[np.bool_] | slice
 
     @classmethod
     def of(cls, windows: list[Window], n: int) -> LedIn:
         """Led in by `n` samples, where the axis was moving by then as it does in the window."""
-        t, drive = zip(*(w.led_in(n) for w in windows), strict=True)
+        t, drive, load = zip(*(w.led_in(n) for w in windows), strict=True)
         own = [np.arange(len(at)) >= len(at) - w.n for at, w in zip(t, windows, strict=True)]
         offsets = np.concatenate(([0], np.cumsum([len(at) for at in t]))).astype(np.int64)
-        return cls(n, offsets, np.concatenate(t), np.concatenate(drive), np.concatenate(own))
+        return cls(n, offsets, np.concatenate(t), np.concatenate(drive), np.concatenate(load), np.concatenate(own))
 
 
 class Pack:
@@ -45,6 +46,7 @@ class Pack:
         self.offsets = np.concatenate(([0], np.cumsum([w.n for w in windows]))).astype(np.int64)
         self.t = np.concatenate([w.t for w in windows])
         self.drive = np.concatenate([w.drive for w in windows])
+        self.load = np.concatenate([w.load for w in windows])
         self.position = np.concatenate([w.position for w in windows])
         self.outputs = np.concatenate([w.outputs for w in windows], axis=1)
         self.dT = np.array([w.dT for w in windows])
@@ -53,7 +55,9 @@ class Pack:
         directions = [w.direction for w in windows if w.direction is not None]
         self.direction = np.concatenate(directions) if directions else None
         self.filter = join(filters) if filters else None
-        self._led_in = {0: LedIn(0, self.offsets, self.t, self.drive, slice(None))}  # and the last other one asked for
+        self._led_in = {
+            0: LedIn(0, self.offsets, self.t, self.drive, self.load, slice(None))
+        }  # and the last other one asked for
         self._histories: dict[tuple[float, int], History] = {}  # the last one asked for
         self._acting: dict[tuple[float, str], dict[int, Array]] = {}  # the same
 
@@ -83,7 +87,7 @@ class Pack:
     def history(self, late: float = 0.0, n: int = 0) -> History:
         """Motion up to `n` samples before each window, since that of the one before, of a position recorded `late`. [s]
 
-        Offsets, time, position, speed, drive, and whether it follows.
+        Offsets, time, position, speed, drive, known load, and whether it follows.
         """
         if (late, n) not in self._histories:
             self._histories = {(late, n): self._history(late, n)}
@@ -99,12 +103,12 @@ class Pack:
             follows.append(number == w.part.number and first <= last <= end)
             at = np.array([last if follows[-1] else first, end])
             at = np.unique(np.concatenate((at, t[(t > at[0]) & (t < end)])))
-            drive = np.interp(at - late, t, w.part.drive)
-            parts.append((at, np.interp(at, t, theta), np.interp(at, t, speed), drive))
+            given = (np.interp(at - late, t, x) for x in (w.part.drive, w.part.load))
+            parts.append((at, np.interp(at, t, theta), np.interp(at, t, speed), *given))
             number, last = w.part.number, end
         offsets = np.concatenate(([0], np.cumsum([len(t) for t, *_ in parts]))).astype(np.int64)
-        t, theta, speed, drive = (np.concatenate(column) for column in zip(*parts, strict=True))
-        return offsets, t, theta, speed, drive, np.array(follows)
+        t, theta, speed, drive, load = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return offsets, t, theta, speed, drive, load, np.array(follows)
 
     def split(self, rows: Array) -> dict[int, Array]:
         """Columns of `rows` by block."""

@@ -211,15 +211,16 @@ class AxisPlant:
     def _simulate(self, pack: Pack, model: axis.Model, zeros: Mapping[str, float]) -> Array:
         zero = zeros.get(pack.bench.name, 0.0)
         if pack.direction is not None:
-            return axis.holding(model, pack.position + zero, pack.direction, pack.t)[None, :]
+            return axis.holding(model, pack.position + zero, pack.direction, pack.t, pack.load)[None, :]
         step = self._step(pack)
         led_in = pack.led_in(max(_late(model)))
         starts = self._starts(pack, model, step, led_in.n)
         starts[:, 0] += zero
         drive = pack.bench.roles.kind
         record = (led_in.offsets, led_in.t, pack.drive_by(model, led_in, self.between), starts)
-        bristles = self._bristles(pack, model, led_in.n)
-        out = axis.simulate(model, drive, *record, step, pack.dT, pack.slide, self.between, bristles)[:, led_in.own]
+        bristles, load = self._bristles(pack, model, led_in.n), led_in.load
+        out = axis.simulate(model, drive, *record, step, pack.dT, pack.slide, self.between, bristles, load)
+        out = out[:, led_in.own]
         out[0] -= zero
         return out[[_KERNEL_ROW[name] for name in pack.bench.roles.outputs]]
 
@@ -291,10 +292,10 @@ class AxisPlant:
         derived = pack.bench.roles.speed is None
         starts[:, :2] = axis.true_state(model, starts[:, :2], derived=derived)
         if axis.is_flexible(model):
-            offsets, t, *measured, drive, follows = pack.history(late_theta, n)
+            offsets, t, *measured, drive, load, follows = pack.history(late_theta, n)
             theta, w = axis.true_state(model, np.column_stack(measured), derived=derived).T
             beyond = axis.beyond_after(
-                model, pack.bench.roles.kind, offsets, t, theta, w, drive, follows, step, self.between
+                model, pack.bench.roles.kind, offsets, t, theta, w, drive, follows, step, self.between, load
             )
             starts[:, 2:] = starts[:, :2] - beyond
         return starts
@@ -304,7 +305,7 @@ class AxisPlant:
         if not axis.has_memory(model):
             return None
         play = NOISE * position_noise(pack.bench, pack.windows[0])
-        offsets, t, theta, w, _, follows = pack.history(_late(model)[0], n)
+        offsets, t, theta, w, _, _, follows = pack.history(_late(model)[0], n)
         return axis.bristles_after(model, offsets, t, theta, w, follows, play)
 
     def main_row(self, block: int) -> int:

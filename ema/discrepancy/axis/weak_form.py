@@ -19,6 +19,7 @@ from ema.models import axis
 from ema.models.axis_layout import row
 
 from .naming import numbers_of
+from .windows import load_noise
 
 if TYPE_CHECKING:
     from ema.core.records import Array
@@ -110,10 +111,10 @@ def weak_form(plant: Measured, point: Point, blocks: Sequence[int]) -> Weak:
         if w.static:
             assert w.direction is not None
             k_t = 1.0 if plant.plant.is_force else float(plant.plant.k_t or 1.0)
-            held = axis.holding(model, w.position + zero, w.direction, w.t)
+            held = axis.holding(model, w.position + zero, w.direction, w.t, w.load)
             y = k_t * (w.drive - held)
             index = np.arange(w.n)[:, None] + offset
-            sigma = np.full(w.n, k_t * b.noise[b.roles.drive].sigma)
+            sigma = np.full(w.n, np.hypot(k_t * b.noise[b.roles.drive].sigma, load_noise(b)))
             piece = _piece(y, sigma, np.zeros(w.n), index, np.ones((w.n, 1)), j)
             parts.append((w.position + zero, w.direction * 1e-9, w.drive, w.t, w.direction, np.full(w.n, w.dT)))
         else:
@@ -174,11 +175,12 @@ def _moving(plant: Measured, model: axis.Model, j: int, offset: int, zero: float
     )
     i, k_t = _current(b, w, drive, speed, z)
     dT = np.full(w.n, w.dT)
-    known = axis.torque_along(model, theta + zero, speed, i, w.t, dT, force=b.roles.kind == "force")
+    known = axis.torque_along(model, theta + zero, speed, i, w.t, dT, w.load, force=b.roles.kind == "force")
     sigma_w = b.noise[b.roles.speed].sigma if b.roles.speed else 0.0
     sigma_theta = b.noise[str(b.roles.position)].sigma if not b.roles.speed else 0.0
     current = "i_q" if "i_q" in b.roles.outputs else b.roles.drive
     sigma_tau = k_t * b.noise[current].sigma / (float(p.R or 1.0) if current == "u_q" else 1.0)
+    sigma_tau = float(np.hypot(sigma_tau, load_noise(b)))
     loudness = max(float(np.std(known)), float(np.std(k_t * i)), 1e-300)
     for half in HALF_WIDTHS:
         phi, first, second = bump(half)

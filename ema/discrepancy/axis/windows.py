@@ -15,7 +15,7 @@ from ema.core.records import Array, Cycle, Record
 from ema.effects.base import T_REFERENCE
 from ema.models.axis_config import Axis
 
-from .channels import MIN_SAMPLES, Roles, find_runs, roles
+from .channels import MIN_SAMPLES, Roles, find_runs, known_load, roles
 from .noise import ESTIMATE_UNCERTAINTY, SIMULATED_TO, Noise, estimate, is_derived
 
 HALF = 5  # samples on each side of a local quadratic
@@ -35,33 +35,37 @@ STRETCH = 0.4  # [s] windows closer together are not independent enough to check
 class Part:
     """Samples of one cycle from gap to gap, in arrays of shape (n_times,).
 
-    Drive and position as recorded, position and speed to begin from; `number` is like no other part's of the record.
+    Drive, torque of a known load and position as recorded, position and speed to begin from; `number` is like no other
+    part's of the record.
     """
 
     number: int
     t: Array
     drive: Array
+    load: Array
     recorded: Array
     position: Array
     speed: Array
 
 
-NO_PART = Part(-1, *(np.empty(0) for _ in range(5)))  # of readings at rest
+NO_PART = Part(-1, *(np.empty(0) for _ in range(6)))  # of readings at rest
 
 
 @dataclass(frozen=True)
 class Window:
     """Consecutive samples of one cycle, in arrays of shape (n_times,).
 
-    `outputs` has one row per output channel of its record. `position`, `speed` are smooth; `static` windows hold
-    samples at rest with the `direction` of approach. `course` is time and drive of the whole cycle. The window begins
-    at sample `first` of its `part`, and the axis has moved in one direction since sample `earliest`.
+    `outputs` has one row per output channel of its record, `load` is the torque of a known load. `position`, `speed`
+    are smooth; `static` windows hold samples at rest with the `direction` of approach. `course` is time and drive of
+    the whole cycle. The window begins at sample `first` of its `part`, and the axis has moved in one direction since
+    sample `earliest`.
     """
 
     group: str
     label: str
     t: Array
     drive: Array
+    load: Array
     outputs: Array
     position: Array
     speed: Array
@@ -88,19 +92,19 @@ class Window:
         """Sample of its part `n` before the window, if the axis was moving by then as it does in the window."""
         return max(self.first - n, min(self.earliest, self.first))
 
-    def led_in(self, n: int) -> tuple[Array, Array]:
-        """Time and drive of the window and up to `n` samples before it."""
+    def led_in(self, n: int) -> tuple[Array, Array, Array]:
+        """Time, drive and known load of the window and up to `n` samples before it."""
         if n == 0:
-            return self.t, self.drive
+            return self.t, self.drive, self.load
         rows = slice(self.begin(n), self.first + self.n)
-        return self.part.t[rows], self.part.drive[rows]
+        return self.part.t[rows], self.part.drive[rows], self.part.load[rows]
 
     def drive_by(self, clock: tuple[float, float], n: int = 0, acting: Array | None = None) -> Array:
         """The drive there, by a clock of its own (`clock_of_drive`): straight lines.
 
         `acting`: what acts of it at the samples of its part, where that is not what was recorded.
         """
-        at, own = self.led_in(n)
+        at, own, _ = self.led_in(n)
         off, late = clock
         if off == late == 0.0:
             return own if acting is None else acting[self.begin(n) : self.first + self.n]
@@ -128,7 +132,9 @@ def bench(plant: Axis, record: Record, name: str, length: float) -> Bench:
         record = replace(record, cycles=numbered)
     if not static and who.position and who.speed and all(is_derived(c, who.position, who.speed) for c in record):
         who = replace(who, speed=None, outputs=tuple(c for c in who.outputs if c != who.speed), derived=who.speed)
-    noise = {c: _noise(plant, record, c) for c in dict.fromkeys([who.drive] if static else [who.drive, *who.outputs])}
+    beside = [who.load] if who.load is not None else []
+    seen = dict.fromkeys([who.drive, *beside] if static else [who.drive, *who.outputs, *beside])
+    noise = {c: _noise(plant, record, c) for c in seen}
     if static and plant.drive != "current" and not plant.is_force:
         raise RecordError(
             f"{record.name}: a record at standstill needs drive: current with i_q [A], or a measured torque or force"
@@ -179,10 +185,11 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
     edges = np.unique(np.concatenate(([0], cuts, gaps, rests.ravel(), [n]))).astype(int)
     n_window = max(MIN_WINDOW, round(length / dt))
     out = []
+    load = known_load(cycle, who.load)
     number = cycle.number * 1_000_000  # stretches and parts of different cycles are different
     starts = np.array([0, *gaps])
     started = _start_states(cycle, who, noise, gaps, (smooth, speed))
-    pieces = zip(*(np.split(x, gaps) for x in (t, cycle[who.drive], raw, *started)), strict=True)
+    pieces = zip(*(np.split(x, gaps) for x in (t, cycle[who.drive], load, raw, *started)), strict=True)
     parts = [Part(number + start, *piece) for start, piece in zip(starts.tolist(), pieces, strict=True)]
     for a, b in pairwise(edges.tolist()):
         if any(start <= a < stop for start, stop in rests):
@@ -195,7 +202,8 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
             outputs = np.stack([cycle[name][rows] for name in who.outputs])
             label = f"{group}, {cycle}, {t[rows][0]:.4g} s"
             stretch = number + int((t[rows][0] - t[0]) / max(STRETCH, length))
-            motion = (t[rows], cycle[who.drive][rows], outputs, smooth[rows], speed[rows], float(np.mean(warmer[rows])))
+            given = (t[rows], cycle[who.drive][rows], load[rows], outputs)
+            motion = (*given, smooth[rows], speed[rows], float(np.mean(warmer[rows])))
             k = int(np.searchsorted(starts, a, side="right")) - 1
             earliest = anew[np.searchsorted(anew, rows.start, side="right") - 1]
             first, since = rows.start - int(starts[k]), int(earliest - starts[k])
@@ -251,6 +259,11 @@ def speed_noise(who: Roles, noise: dict[str, Noise], period: float) -> float:
     return noise[who.speed].sigma if who.speed is not None else noise[str(who.position)].sigma / (HALF * period)
 
 
+def load_noise(b: Bench) -> float:
+    """Noise of one sample of a known load. [N m or N]"""
+    return b.noise[b.roles.load].sigma if b.roles.load is not None else 0.0
+
+
 def _rests(still: NDArray[np.bool_], margin: int) -> NDArray[np.int_]:
     """Begin and end of each rest with `margin` samples about it, shape (n_rests, 2).
 
@@ -302,7 +315,7 @@ def _static(group: str, cycle: Cycle, who: Roles) -> list[Window]:
         rows = slice(int(part[0]), int(part[-1]) + 1)
         i = cycle[who.drive][rows]
         label = f"{group}, {cycle}, {theta[rows][0]:.3g} rad"
-        columns = (t[rows], i, i[None, :], theta[rows], np.zeros(len(i)))
+        columns = (t[rows], i, known_load(cycle, who.load)[rows], i[None, :], theta[rows], np.zeros(len(i)))
         out.append(Window(group, label, *columns, 0.0, True, direction[rows], cycle.number * 1_000_000 + k))
     return out
 

@@ -13,6 +13,7 @@ import numpy as np
 from ema.core.errors import RecordError
 from ema.core.names import CHANNELS, CURRENTS
 from ema.core.records import Array, Cycle, Record
+from ema.discrepancy.axis.channels import LOAD_CHANNEL, known_load
 
 from .agreements import agreements, derivative, smooth
 from .first_fit import FirstFit, first_fit
@@ -57,6 +58,11 @@ class Sheet:
         gear = self.gear or 1.0
         return {("load", "motor"): 1.0 / gear, ("motor", "load"): gear}.get(at, 1.0)
 
+    @property
+    def load_ratio(self) -> float:
+        """A known load as it acts on the measured side, over what was recorded on the user's."""
+        return 1.0 / self.gear if self.gear is not None and self.measured_at != "load" else 1.0
+
 
 def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
     """Parameters of an axis from its records; RecordError where they hold no motion or no drive."""
@@ -66,9 +72,10 @@ def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
     position, speed = ("q", "v") if linear else ("theta_m", "w_m")
     if not have & {position, speed}:
         raise RecordError(f"{records[0].name}: no motion: theta_m, w_m, q or v is wanted (has {there})")
-    drive = next((name for name in ("force", "torque", "i_q", "u_q", "duty") if name in have), None)
+    measured = "force" if linear else "torque"
+    drive = next((name for name in (measured, "i_q", "u_q", "duty") if name in have), None)
     if drive is None:
-        raise RecordError(f"{records[0].name}: no drive: i_q, torque, force, u_q or duty is wanted (has {there})")
+        raise RecordError(f"{records[0].name}: no drive: {measured}, i_q, u_q or duty is wanted (has {there})")
     known = [Known("kind", "axis", "")] + ([Known("motion", "linear", "")] if linear else [])
     kind = {"i_q": "current", "u_q": "voltage", "duty": "voltage"}.get(drive, drive)
     known.append(Known("drive", kind, f"by the channel {drive}"))
@@ -86,7 +93,15 @@ def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
             known.append(Known(key, "24 V", "a guess: give --supply"))
     if "theta_n" in have:
         known.append(Known("neighbour", "inner", "a guess: outer where theta_n is of the link that hangs on this one"))
-    fit = first_fit(records, position, speed, _torques(records, drive, position, speed, sheet, k_t, k_e))
+    torques = _torques(records, drive, position, speed, sheet, k_t, k_e)
+    net = [
+        [
+            tau - sheet.load_ratio * known_load(cycle, LOAD_CHANNEL[linear])
+            for tau, cycle in zip(own, record, strict=True)
+        ]
+        for own, record in zip(torques, records, strict=True)
+    ]
+    fit = first_fit(records, position, speed, net)
     return [*known, *_mechanical(fit, sheet, drive, linear=linear)]
 
 

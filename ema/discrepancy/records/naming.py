@@ -15,11 +15,13 @@ _COMMAND = {
     "soll",
 }  # fmt: skip
 _MEASURED = {"present", "actual", "act", "measured", "meas", "ist"}
-_SUPPLY = {"dc", "bus", "supply", "vbus", "udc", "vdc", "battery", "batt", "vsupply"}
+_SUPPLY = {"dc", "bus", "supply", "vbus", "udc", "vdc", "battery", "batt", "bat", "vbat", "vbatt", "vsupply"}
+_LOAD = {"load", "external", "ext", "airload", "resisting", "brake", "last", "lastmoment"}
 _OUTPUT = {"user", "output", "load", "lvdt", "surface", "ram"}
 _PHASE = {"a": "i_a", "b": "i_b", "c": "i_c", "u": "i_a", "v": "i_b", "w": "i_c"}
 _PHASES = re.compile(r"(?:i|cur|current|phase|iphase|i ?phase)[ _]*([abcuvw])$")
 _DRIVES = ("current", "force", "torque", "duty")
+_BY_LOAD = {"force": "load_force", "torque": "load_torque"}
 _SHARES = {"%", "percent", "pct", "per cent"}
 _WRITTEN = {  # as a proposal; a file's own is not read so
     "u/min": "rpm", "1/min": "rpm", "min-1": "rpm", "grad": "deg", "dps": "deg/s", "rps": "turn/s",
@@ -40,7 +42,7 @@ _WORDS = {
     "voltage": "voltage volt volts u uq spannung",
     "force": "force kraft f",
     "torque": "torque tau moment effort trq drehmoment",
-    "duty": "duty pwm dutycycle",
+    "duty": "duty pwm dutycycle throttle",
     "temperature": "temperature temp temperatur",
     "enabled": "enabled enable active freigabe",
 }
@@ -62,14 +64,25 @@ def propose(table: Table) -> list[Proposal]:
     What was commanded is proposed for a drive only where nothing that was measured is.
     """
     seen = [_quantity(title, table.units.get(index)) for index, title in enumerate(table.header)]
-    is_linear = any(what in ("length", "force", "speed") for what, _ in seen)
+    measured = {what for what, _ in seen}
+    is_linear = bool(measured & {"length", "speed"} or ("force" in measured and not measured & {"angle", "turning"}))
     is_actuator = sum(_PHASES.search(_plain(title)) is not None for title in table.header) >= 2
-    has_duty = any(what == "duty" for what, _ in seen)
+    has_duty = "duty" in measured
+    has_drive = any(
+        what in ("current", "voltage", "duty") or (what in _BY_LOAD and not _is_of_load(title))
+        for title, (what, _) in zip(table.header, seen, strict=True)
+    )
     taken: dict[str, str] = {}
     found: dict[int, Proposal] = {}
     for index in sorted(range(len(seen)), key=lambda k: _is_commanded_drive(table.header[k], seen[k][0])):
         title, (what, unit) = table.header[index], seen[index]
         channel = _channel(title, what, is_linear and unit is None, is_actuator, has_duty)
+        if channel == "force" and not is_linear:
+            channel, lead = None, "{channel: load_torque, unit: N m, scale: 7.96e-4} where a screw leads by 5 mm"
+            found[index] = Proposal(title, None, None, f"a force on a rotary axis; of a load it would be {lead}")
+            continue
+        if has_drive and what in _BY_LOAD and _is_of_load(title):
+            channel = _BY_LOAD[what]  # what the drive works against
         if channel is not None and (said := _of_its_own_scale(title, table.units.get(index), channel)):
             found[index] = Proposal(title, None, None, said)
         elif channel is None:
@@ -96,6 +109,10 @@ def _plain(title: str) -> str:
     """The title without its unit, in small letters, words apart: ``MotorPos_ref [deg]`` is ``motor pos ref``."""
     name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", titled(title)[0])
     return re.sub(r"[^a-z0-9]+", " ", name.lower()).strip()
+
+
+def _is_of_load(title: str) -> bool:
+    return bool(set(_plain(title).split()) & _LOAD)
 
 
 def _is_commanded_drive(title: str, what: str | None) -> bool:

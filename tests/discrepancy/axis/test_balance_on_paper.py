@@ -154,7 +154,7 @@ def test_test_functions_are_as_wide_as_noise_wants_them():
 
     def of(sigma):
         noisy = m.theta + sigma * np.random.default_rng(1).standard_normal(N)
-        course = Course("one", bench, m.t, m.drive, noisy, None, None, m.dT, {"position": sigma})
+        course = Course("one", bench, m.t, m.drive, noisy, None, None, m.dT, 0.0 * m.t, {"position": sigma})
         return half_widths([course])["one"]
 
     widths = [of(sigma) for sigma in (1e-6, 1e-3, 1e-2)]

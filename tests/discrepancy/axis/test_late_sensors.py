@@ -37,7 +37,7 @@ def test_what_a_late_sensor_shows_at_first_is_the_motion_before_the_window(chann
 def test_a_window_is_led_in_no_further_than_the_axis_moved_as_in_it():
     plant = on_paper.plant(on_paper.cycle(swing=SWING))
     for w in plant.windows:
-        t, drive = w.led_in(50)
+        t, drive, _ = w.led_in(50)
         assert len(t) == len(drive) == w.first - w.begin(50) + w.n
         assert (t[-w.n :] == w.t).all()
         lead = w.part.speed[w.begin(50) : w.first]

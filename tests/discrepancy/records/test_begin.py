@@ -142,3 +142,13 @@ def test_constants_of_the_motor_are_those_at_the_load_where_the_motion_was_measu
     assert pytest.approx(N**2 * J, rel=0.05) == plant.J
     assert pytest.approx(N * F_D, rel=0.3) == plant.F_d
     assert pytest.approx(N**2 * C, rel=0.3) == plant.C
+
+
+def test_a_load_cell_beside_a_current_is_no_drive_and_its_load_no_friction(tmp_path):
+    (cycle,) = bench().cycles
+    load = 0.8 * np.sin(2.0 * np.pi * 0.37 * cycle["t"])
+    channels = {**cycle.channels, "i_q": cycle["i_q"] + load / K_T, "load_torque": load}
+    plant = axis_config.load(init(Record((Cycle(0, channels),)), tmp_path, "--k-t", str(K_T)))
+    assert plant.drive == "current"
+    assert pytest.approx(J, rel=0.05) == plant.J
+    assert pytest.approx(F_D, rel=0.2) == plant.F_d

@@ -41,6 +41,28 @@ def channels(answer):
             },
         ),
         (
+            "t [s],angle [rad],current [A],load torque [N m]", "",
+            {
+                "t [s]": ("t", "s"), "angle [rad]": ("theta_m", "rad"), "current [A]": ("i_q", "A"),
+                "load torque [N m]": ("load_torque", "N m"),
+            },
+        ),
+        (
+            "t [s],rpm,throttle [%],vbat [V],load [N]", "",  # no force acts on a rotary axis: its owner knows the lead
+            {
+                "t [s]": ("t", "s"), "rpm": ("w_m", "rpm"), "throttle [%]": ("duty", "%"), "vbat [V]": ("u_dc", "V"),
+                "load [N]": "ignore",
+            },
+        ),
+        (
+            "t [s],joint torque [N m],load torque [N m],angle [rad]", "",  # of two torques one is the drive's
+            {
+                "t [s]": ("t", "s"), "joint torque [N m]": ("torque", "N m"),
+                "load torque [N m]": ("load_torque", "N m"),
+                "angle [rad]": ("theta_m", "rad"),
+            },
+        ),
+        (
             "Time [ms],Position [mm],Force [N]", "",
             {"Time [ms]": ("t", "ms"), "Position [mm]": ("q", "mm"), "Force [N]": ("force", "N")},
         ),

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ema.discrepancy.axis.windows import load_noise
 from ema.effects.base import T_REFERENCE
 
 if TYPE_CHECKING:
     from ema.core.records import Array, Cycle
     from ema.discrepancy.axis.measured import Measured
-    from ema.discrepancy.axis.windows import Bench
+    from ema.discrepancy.axis.windows import Bench, Window
 
 LATE = {"held": 0.5, "held before": -0.5}  # samples, by what the drive does between them
 MOST = 60_000  # samples of all cycles together; of longer ones means of neighbours are taken
@@ -27,7 +28,7 @@ class Course:
     is None where it was not recorded. `noise` is the rms of each by channel name. A `static` course holds readings at
     rest, each approached in `direction`. `late`: samples by which the drive acts later than its channel says (one that
     is held from sample to sample: half a sample). `other`: angle of a neighbouring axis. `zero`: angle to be added to
-    the positions.
+    the positions. `load`: torque of a known load, 0 where none was recorded.
     """
 
     record: str
@@ -38,6 +39,7 @@ class Course:
     speed: Array | None
     current: Array | None
     dT: Array
+    load: Array
     noise: dict[str, float]
     static: bool = False
     direction: Array | None = None
@@ -65,6 +67,7 @@ class Course:
             speed=more(self.speed, "speed"),
             current=more(self.current, "current"),
             other=more(self.other, "position"),
+            load=self.load + self.noise.get("load", 0.0) * rng.standard_normal(len(self.load)),
         )
 
 
@@ -97,18 +100,21 @@ def _moving(b: Bench, cycle: Cycle, every: int, late: float) -> Course:
     assert t is not None
     assert drive is not None
     current = "i_q" if who.kind == "voltage" and "i_q" in who.outputs else None
-    names = {"drive": who.drive, "position": who.position, "speed": who.speed, "current": current}
+    names = {"drive": who.drive, "position": who.position, "speed": who.speed, "current": current, "load": who.load}
     noise = {role: b.noise[name].sigma / every**0.5 for role, name in names.items() if name in b.noise}
     warm = of("temp_w")
     dT = np.zeros(len(t)) if warm is None else warm - T_REFERENCE
-    return Course(
-        b.name, b, t, drive, of(who.position), of(who.speed), of(current), dT, noise, late=late, other=of("theta_n")
-    )
+    load = of(who.load)
+    load = np.zeros(len(t)) if load is None else load
+    measured = (drive, of(who.position), of(who.speed), of(current))
+    return Course(b.name, b, t, *measured, dT, load, noise, late=late, other=of("theta_n"))
 
 
 def _static(b: Bench) -> list[Course]:
-    noise = {"drive": b.noise[b.roles.drive].sigma}
-    return [
-        Course(b.name, b, w.t, w.drive, w.position, np.zeros(w.n), None, np.full(w.n, w.dT), noise, True, w.direction)
-        for w in b.windows
-    ]
+    noise = {"drive": b.noise[b.roles.drive].sigma, "load": load_noise(b)}
+
+    def course(w: Window) -> Course:
+        measured = (w.drive, w.position, np.zeros(w.n), None)
+        return Course(b.name, b, w.t, *measured, np.full(w.n, w.dT), w.load, noise, True, w.direction)
+
+    return [course(w) for w in b.windows]

@@ -67,7 +67,7 @@ def integrate_rows(
             centres = np.arange(matrix.shape[0])
             alpha, own, whole = np.zeros(len(centres)), np.full(len(centres), block), np.ones(len(centres), bool)
             cluster = np.full(len(centres), piece)
-            sigma = np.full(len(centres), c.noise["drive"] * _per_drive(plant, c) / max(1, round(thin)) ** 0.5)
+            sigma = np.full(len(centres), _torque_noise(plant, c) / max(1, round(thin)) ** 0.5)
         else:
             matrix, slopes, alpha, centres, sigma = _weak(plant, c, motion, widths[c.record], thin, unsure)
             place = (c.t[centres] - c.t[0]) / length
@@ -110,10 +110,15 @@ def _weak(
     columns = (np.repeat(np.arange(len(centres)), index.shape[1]), index.ravel())
     sigma = np.hypot(
         plant.plant.inertia * noise[good],
-        _per_drive(plant, c) * c.noise.get("drive", 0.0) * np.sqrt((phi**2).sum(axis=1)),
+        _torque_noise(plant, c) * np.sqrt((phi**2).sum(axis=1)),
     )
     weights = (csr_array((x.ravel(), columns), shape=shape) for x in (phi, first))
     return (*weights, alpha[good], centres, sigma)
+
+
+def _torque_noise(plant: Measured, c: Course) -> float:
+    """Of one sample, of what drives less a known load. [N m or N]"""
+    return float(np.hypot(_per_drive(plant, c) * c.noise.get("drive", 0.0), c.noise.get("load", 0.0)))
 
 
 def _per_drive(plant: Measured, c: Course) -> float:

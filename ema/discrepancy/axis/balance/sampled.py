@@ -39,7 +39,7 @@ def smooth_motion(plant: Measured, model: axis.Model, c: Course, half: float) ->
     direction = np.where(np.abs(w) > rest, np.sign(w), 0.0)
     i, drive = _current(c, w, model.z)
     is_force = c.bench.roles.kind == "force"
-    known = axis.torque_along(model, theta, w, i, c.t, c.dT, force=is_force)
+    known = axis.torque_along(model, theta, w, i, c.t, c.dT, c.load, force=is_force)
     still = np.zeros(len(w), bool)
     motion = Motion(c.t, theta, w, a, drive, known, direction, c.position is not None, still, dT=c.dT)
     motion = replace(motion, gear_orders=tuple(plant.plant.gear_orders), turns=_turns(plant))
@@ -59,7 +59,7 @@ def at_rest(plant: Measured, model: axis.Model, c: Course) -> Motion:
     assert c.direction is not None
     k_t = 1.0 if plant.plant.is_force else float(plant.plant.k_t or 1.0)
     theta = c.position + c.zero
-    held = axis.holding(model, theta, c.direction, c.t)
+    held = axis.holding(model, theta, c.direction, c.t, c.load)
     zero = np.zeros(len(c.t))
     drive = k_t * c.drive
     return Motion(
