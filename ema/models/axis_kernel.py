@@ -297,8 +297,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide
             tau = (0.0 if is_driven else tau_m) - torques(z, lines, terms, theta_mid, w_mid, i, t_mid)
             if stiffness > 0.0:
                 T = stiffness * (theta_mid - theta_b - 0.5 * h * w_b) + damping * (w - w_b)
-                tau -= T
-                tau += 0.0 if is_driven else z[LOAD]
+                tau += -T if is_driven else z[LOAD] - T  # the load is beyond the gear too
                 pull = T + (tau_m if is_driven else -z[LOAD]) - drag * w_b
                 theta_b += 0.5 * h * w_b
                 dw_b = rubbing_speed_after(w_b, pull, rubbing, h / J_b) - w_b

@@ -61,22 +61,16 @@ def roles(plant: Axis, record: Record) -> Roles:
         raise RecordError(
             f"{record.name}: the axis does not move ({' and '.join(moving)} constant): nothing to compare"
         )
-    load = LOAD_CHANNEL[plant.is_linear]
-    _finite(record, (drive, *outputs, *([load] if load in have else [])))
+    load = LOAD_CHANNEL[plant.is_linear] if LOAD_CHANNEL[plant.is_linear] in have else None
+    _finite(record, (drive, *outputs, *([load] if load else [])))
     commanded = kind in ("voltage", "speed-loop") or plant.position_loop is not None  # a drive may go to its limit
     _not_clipped(record, tuple(moving) if commanded else (drive, *moving), position)
     if speed in have and position in have:
         _one_scale(record, position, speed)
     if speed in have and kind in ("current", "force"):
-        _in_step(plant, record, drive, speed)
-    return Roles(
-        kind,
-        drive,
-        position if position in have else None,
-        speed if speed in have else None,
-        tuple(outputs),
-        load=load if load in have else None,
-    )
+        _in_step(plant, record, drive, speed, load)
+    moves = (position if position in have else None, speed if speed in have else None)
+    return Roles(kind, drive, *moves, tuple(outputs), load=load)
 
 
 def _kind(plant: Axis, record: Record) -> str:
@@ -118,7 +112,7 @@ def _one_scale(record: Record, position: str, speed: str) -> None:
         )
 
 
-def _in_step(plant: Axis, record: Record, drive: str, speed: str) -> None:
+def _in_step(plant: Axis, record: Record, drive: str, speed: str, load: str | None) -> None:
     """The torque that the motion needs must lie over the one that was recorded, not seconds beside it."""
     best: dict[int, list[float]] = {}
     for cycle in record:
@@ -129,7 +123,7 @@ def _in_step(plant: Axis, record: Record, drive: str, speed: str) -> None:
         smooth = savgol_filter(w, width, 2)
         need = plant.inertia * np.gradient(smooth, t) + plant.C * smooth + plant.F_d * np.sign(smooth)
         given = savgol_filter(cycle[drive], width, 2) * (1.0 if plant.is_force else float(plant.k_t or 1.0))
-        given -= known_load(cycle, LOAD_CHANNEL[plant.is_linear])
+        given -= known_load(cycle, load)
         need, given = need - need.mean(), given - given.mean()
         lag = int(np.argmax(correlate(need, given, mode="same"))) - len(need) // 2
         here, there = _alike(need, given, 0), _alike(need, given, lag)

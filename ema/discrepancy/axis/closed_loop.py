@@ -16,7 +16,7 @@ from ema.discrepancy.plant import Point
 from ema.models import axis
 from ema.models.axis_config import PositionLoop
 
-from .channels import LOAD_CHANNEL, known_load
+from .channels import Roles, known_load
 from .intake import of_loop
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def closed_loop(plant: AxisPlant, point: Point) -> LoopRun | None:
         if b.roles.kind not in ("current", "voltage", "force") or not {position, reference} <= set(record.channels):
             return None
         for cycle in record:
-            theta, given = _run(plant, model, loop, b.roles.kind, cycle, reference, position)
+            theta, given = _run(plant, model, loop, b.roles, cycle, reference, position)
             n = len(theta)
             for k, (y, x) in enumerate(((cycle[position][:n], theta), (cycle[b.roles.drive][:n], given))):
                 squares[k] += float(np.sum((y - x) ** 2)), float(np.sum((y - y.mean()) ** 2))
@@ -55,12 +55,12 @@ def closed_loop(plant: AxisPlant, point: Point) -> LoopRun | None:
 
 
 def _run(
-    plant: AxisPlant, model: axis.Model, loop: PositionLoop, kind: str, cycle: Cycle, reference: str, position: str
+    plant: AxisPlant, model: axis.Model, loop: PositionLoop, who: Roles, cycle: Cycle, reference: str, position: str
 ) -> tuple[Array, Array]:
     """Position and drive of one cycle, from its measured start."""
     t, ref = cycle["t"][:MOST], cycle[reference][:MOST]
     w_ref = cycle["w_ref"][:MOST] if "w_ref" in cycle else np.gradient(ref, t)
-    load = known_load(cycle, LOAD_CHANNEL[plant.plant.is_linear])
+    load = known_load(cycle, who.load)
     supply = cycle["u_dc"] if "u_dc" in cycle else np.full(len(t), plant.plant.V_dc or 1.0)
     theta, given = np.empty(len(t)), np.empty(len(t))
     state, bristle = np.zeros((1, 4)), 0.0
@@ -74,7 +74,7 @@ def _run(
             drive = np.array([given[k], given[k]])
             window = (offsets, t[k : k + 2], drive, state, step)
             bristles, here = np.array([bristle]), load[k : k + 2]
-            out = axis.simulate(model, kind, *window, between="held", bristles=bristles, load=here)
+            out = axis.simulate(model, who.kind, *window, between="held", bristles=bristles, load=here)
             bristle = axis.built_up(model, bristle, out[0, 1] - state[0, 0])
             state[0, :2] = out[0, 1], out[1, 1]
     return theta, given

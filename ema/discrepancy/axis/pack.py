@@ -55,9 +55,8 @@ class Pack:
         directions = [w.direction for w in windows if w.direction is not None]
         self.direction = np.concatenate(directions) if directions else None
         self.filter = join(filters) if filters else None
-        self._led_in = {
-            0: LedIn(0, self.offsets, self.t, self.drive, self.load, slice(None))
-        }  # and the last other one asked for
+        bare = LedIn(0, self.offsets, self.t, self.drive, self.load, slice(None))
+        self._led_in = {0: bare}  # and the last other one asked for
         self._histories: dict[tuple[float, int], History] = {}  # the last one asked for
         self._acting: dict[tuple[float, str], dict[int, Array]] = {}  # the same
 

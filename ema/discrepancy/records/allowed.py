@@ -8,13 +8,13 @@ import numpy as np
 
 from ema.core.names import CHANNELS, CURRENTS
 from ema.core.records import Record
+from ema.discrepancy.axis.channels import LOAD_CHANNEL
 
 from .agreements import Agreement
 from .facts import FALLEN, ChannelFacts, Sampling
 
 ACTUATOR = ("t", *CURRENTS, "theta_m", "theta_u", "theta_cmd")
 DRIVES = ("i_q", "torque", "force", "u_q", "duty", "w_ref")
-KNOWN_LOADS = {"load_torque", "load_force"}
 FEW = 500  # samples of a record from which a fit has something left to be tested with
 DUTY = 1.1  # largest duty cycle, with what a converter may add
 JITTERY = 0.2  # of a period, rms
@@ -42,7 +42,8 @@ def list_allowed(record: Record, clock: Sampling, facts: list[ChannelFacts], agr
     motion = have & {"theta_m", "w_m", "q", "v"}
     drives = [name for name in DRIVES if name in have]
     if motion and drives:
-        against = f" against the known load {' and '.join(known)}" if (known := sorted(have & KNOWN_LOADS)) else ""
+        load = LOAD_CHANNEL[not motion & {"theta_m", "w_m"}]
+        against = f" against the known load {load}" if load in have else ""
         plants["axis"] = f"inertia, friction, loads and the effects of an axis, driven by {', '.join(drives)}{against}"
     else:
         missing["axis"] = ([] if motion else ["a position or a speed: theta_m, w_m, q or v"]) + (

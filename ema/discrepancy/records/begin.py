@@ -93,15 +93,7 @@ def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
             known.append(Known(key, "24 V", "a guess: give --supply"))
     if "theta_n" in have:
         known.append(Known("neighbour", "inner", "a guess: outer where theta_n is of the link that hangs on this one"))
-    torques = _torques(records, drive, position, speed, sheet, k_t, k_e)
-    net = [
-        [
-            tau - sheet.load_ratio * known_load(cycle, LOAD_CHANNEL[linear])
-            for tau, cycle in zip(own, record, strict=True)
-        ]
-        for own, record in zip(torques, records, strict=True)
-    ]
-    fit = first_fit(records, position, speed, net)
+    fit = first_fit(records, position, speed, _torques(records, drive, position, speed, sheet, k_t, k_e))
     return [*known, *_mechanical(fit, sheet, drive, linear=linear)]
 
 
@@ -189,7 +181,8 @@ def _of_phase(sheet: Sheet) -> str:
 def _torques(
     records: Sequence[Record], drive: str, position: str, speed: str, sheet: Sheet, k_t: float, k_e: float
 ) -> list[list[Array]]:
-    """The drive's torque at the samples, by record and cycle; zeros where a voltage does not tell it."""
+    """The drive's torque less a known load, by record and cycle; zeros for what a voltage does not tell of it."""
+    load = LOAD_CHANNEL[position == "q"]
 
     def of(cycle: Cycle) -> Array:
         if drive not in ("u_q", "duty"):
@@ -201,7 +194,7 @@ def _torques(
         w = smooth(cycle[speed]) if speed in cycle else derivative(cycle, position)
         return np.asarray(k_t * (u - k_e * w) / sheet.R)
 
-    return [[of(cycle) for cycle in record.cycles] for record in records]
+    return [[of(cycle) - sheet.load_ratio * known_load(cycle, load) for cycle in record] for record in records]
 
 
 def _number(value: float, unit: str) -> str:

@@ -77,13 +77,12 @@ def propose(table: Table) -> list[Proposal]:
     for index in sorted(range(len(seen)), key=lambda k: _is_commanded_drive(table.header[k], seen[k][0])):
         title, (what, unit) = table.header[index], seen[index]
         channel = _channel(title, what, is_linear and unit is None, is_actuator, has_duty)
-        if channel == "force" and not is_linear:
-            channel, lead = None, "{channel: load_torque, unit: N m, scale: 7.96e-4} where a screw leads by 5 mm"
-            found[index] = Proposal(title, None, None, f"a force on a rotary axis; of a load it would be {lead}")
-            continue
         if has_drive and what in _BY_LOAD and _is_of_load(title):
             channel = _BY_LOAD[what]  # what the drive works against
-        if channel is not None and (said := _of_its_own_scale(title, table.units.get(index), channel)):
+        if what == "force" and not is_linear:
+            lead = "{channel: load_torque, unit: N m, scale: 7.96e-4} where a screw leads by 5 mm"
+            found[index] = Proposal(title, None, None, f"a force on a rotary axis; of a load it would be {lead}")
+        elif channel is not None and (said := _of_its_own_scale(title, table.units.get(index), channel)):
             found[index] = Proposal(title, None, None, said)
         elif channel is None:
             found[index] = Proposal(title, None, None, "no channel of an axis or an actuator by its title and unit")

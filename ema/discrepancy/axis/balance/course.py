@@ -58,8 +58,9 @@ class Course:
         def more(x: Array | None, name: str) -> Array | None:
             return None if x is None else x + self.noise.get(name, 0.0) * rng.standard_normal(len(x))
 
-        drive = more(self.drive, "drive")
+        drive, load = more(self.drive, "drive"), more(self.load, "load")
         assert drive is not None
+        assert load is not None
         return replace(
             self,
             drive=drive,
@@ -67,7 +68,7 @@ class Course:
             speed=more(self.speed, "speed"),
             current=more(self.current, "current"),
             other=more(self.other, "position"),
-            load=self.load + self.noise.get("load", 0.0) * rng.standard_normal(len(self.load)),
+            load=load,
         )
 
 
