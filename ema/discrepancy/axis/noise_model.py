@@ -11,7 +11,7 @@ from ema.core.records import Array
 from ema.models.axis_config import Axis
 
 from .whitening import Filter, design, open_loop_variance, variance_without_start
-from .windows import HALF, START_NOISE, Bench, Window, load_noise, speed_noise
+from .windows import HALF, START_NOISE, Bench, Window, speed_noise
 
 TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
 FIRST, FIRST_PART = 12, 4  # samples at least, and share of a window, to which its start state is fitted
@@ -90,7 +90,7 @@ def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseM
     }[kind]
     if kind == "speed-loop":
         damping = gain / J
-    process = np.hypot(gain * drive_noise, load_noise(b)) / J
+    process = np.hypot(gain * drive_noise, b.load_noise) / J
     speed = w.part.speed[w.first : w.first + w.n]  # smoothed no wider than it bends: a stop is at its own sample
     at_rest = np.abs(speed) < 3.0 * START_NOISE * speed_noise(b.roles, b.noise, w.period)
     process = np.where(at_rest & np.roll(at_rest, 1) & np.roll(at_rest, -1), 0.0, process)
@@ -115,7 +115,7 @@ def without_start(p: Axis, b: Bench, w: Window, r: Array) -> tuple[Array, Array]
     The start state is fitted to the window's first part.
     """
     if w.static:
-        of_load = load_noise(b) / float(p.k_t or 1.0)
+        of_load = b.load_noise / float(p.k_t or 1.0)
         return r, np.full((1, w.n), b.noise[b.roles.drive].sigma ** 2 + of_load**2)
     m = noise_model(p, b, w, turning=False)
     H, damping = m.H, m.damping

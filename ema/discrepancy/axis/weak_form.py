@@ -19,7 +19,6 @@ from ema.models import axis
 from ema.models.axis_layout import row
 
 from .naming import numbers_of
-from .windows import load_noise
 
 if TYPE_CHECKING:
     from ema.core.records import Array
@@ -114,7 +113,7 @@ def weak_form(plant: Measured, point: Point, blocks: Sequence[int]) -> Weak:
             held = axis.holding(model, w.position + zero, w.direction, w.t, w.load)
             y = k_t * (w.drive - held)
             index = np.arange(w.n)[:, None] + offset
-            sigma = np.full(w.n, np.hypot(k_t * b.noise[b.roles.drive].sigma, load_noise(b)))
+            sigma = np.full(w.n, np.hypot(k_t * b.noise[b.roles.drive].sigma, b.load_noise))
             piece = _piece(y, sigma, np.zeros(w.n), index, np.ones((w.n, 1)), j)
             parts.append((w.position + zero, w.direction * 1e-9, w.drive, w.t, w.direction, np.full(w.n, w.dT)))
         else:
@@ -180,7 +179,7 @@ def _moving(plant: Measured, model: axis.Model, j: int, offset: int, zero: float
     sigma_theta = b.noise[str(b.roles.position)].sigma if not b.roles.speed else 0.0
     current = "i_q" if "i_q" in b.roles.outputs else b.roles.drive
     sigma_tau = k_t * b.noise[current].sigma / (float(p.R or 1.0) if current == "u_q" else 1.0)
-    sigma_tau = float(np.hypot(sigma_tau, load_noise(b)))
+    sigma_tau = float(np.hypot(sigma_tau, b.load_noise))
     loudness = max(float(np.std(known)), float(np.std(k_t * i)), 1e-300)
     for half in HALF_WIDTHS:
         phi, first, second = bump(half)

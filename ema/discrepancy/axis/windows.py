@@ -122,6 +122,11 @@ class Bench:
     windows: tuple[Window, ...]
     static: bool
 
+    @property
+    def load_noise(self) -> float:
+        """Noise of one sample of a known load. [N m or N]"""
+        return self.noise[self.roles.load].sigma if self.roles.load is not None else 0.0
+
 
 def bench(plant: Axis, record: Record, name: str, length: float) -> Bench:
     """Cut one record into windows of about `length` seconds."""
@@ -257,11 +262,6 @@ def _smooth(x: Array, gaps: NDArray[np.int_], width: int, dt: float | None = Non
 def speed_noise(who: Roles, noise: dict[str, Noise], period: float) -> float:
     """Noise of one sample of the speed; where it is derived, from that of the position."""
     return noise[who.speed].sigma if who.speed is not None else noise[str(who.position)].sigma / (HALF * period)
-
-
-def load_noise(b: Bench) -> float:
-    """Noise of one sample of a known load. [N m or N]"""
-    return b.noise[b.roles.load].sigma if b.roles.load is not None else 0.0
 
 
 def _rests(still: NDArray[np.bool_], margin: int) -> NDArray[np.int_]:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ema.discrepancy.axis.windows import load_noise
 from ema.effects.base import T_REFERENCE
 
 if TYPE_CHECKING:
@@ -112,7 +111,7 @@ def _moving(b: Bench, cycle: Cycle, every: int, late: float) -> Course:
 
 
 def _static(b: Bench) -> list[Course]:
-    noise = {"drive": b.noise[b.roles.drive].sigma, "load": load_noise(b)}
+    noise = {"drive": b.noise[b.roles.drive].sigma, "load": b.load_noise}
 
     def course(w: Window) -> Course:
         measured = (w.drive, w.position, np.zeros(w.n), None)
