@@ -283,7 +283,7 @@ def test_sensors_that_read_alike_are_no_lighter_rotor_behind_a_ridge(hidden, shi
         for name in ("viscous_drag", "inertia", "current_gain")
     )
     behind = search.model(effects, (*K_FREE, *(f for c in effects for f in c.frees)), start, None, 1)
-    found, v = settle_at_minimum(search, behind, search.verdict(behind))
+    found, v = settle_at_minimum(search, behind, search.verdict(behind), [()] * 3)
     assert v.is_noise
     true = {"inertia.change": 0.2, "viscous_drag.coefficient": 8.1e-5}
     true |= {f"current_gain.{name}": x for name, x in truth.items()}

@@ -9,7 +9,7 @@ from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.problem import ActuatorProblem, as_cause
+from ema.discrepancy.actuator.problem import ActuatorProblem, as_cause, cost_of
 from ema.discrepancy.engine.records import Pool, seeds
 
 
@@ -48,3 +48,12 @@ def test_causes_are_the_library_with_sizes_within_what_is_credible(short):
         for p in c.parameters:
             assert p.low <= p.neutral <= p.high
             assert p.usual > 0.0
+
+
+def test_an_effect_costs_its_rarity_and_the_sizes_it_might_have_had_and_never_less_than_its_rarity(short):
+    late = next(c for c in candidates(short.plant.plant, short.plant.data, ()) if c.effect == "comparator_delay")
+    (time,) = as_cause(late).parameters
+    costs = [cost_of(late, {time.name: share * time.usual}) for share in (0.01, 0.1, 1.0, 10.0)]
+    assert costs[0] - costs[1] == pytest.approx(np.log(10.0))
+    assert costs[1] - costs[2] == pytest.approx(np.log(10.0))
+    assert costs[2] == costs[3] == pytest.approx(np.log(49.0))  # one in fifty

@@ -4,11 +4,16 @@ A hysteresis comparator that is evaluated every Δt switches late by Δt/2 on av
 current by up to a quarter of (slope × Δt), alike in every cycle. None of the nominal steps may come near it. So where
 the nominal ones leave a rest, others are tried on the model as it is; and near the truth the pattern of the currents
 tells the step, however fine.
+
+Legs that follow late by a time of their own do nearly the same (`comparator_delay`), and that is an effect: where a
+record tells a step coarser than the usual ones, either is fitted, and the likelier taken.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+
+import numpy as np
 
 from ema.discrepancy.plant import Point
 
@@ -25,6 +30,8 @@ FELT = 0.05  # difference in misfit; less is chance
 AROUND = (1.0, 1.25, 0.8)  # times the step, for the noise: what is left unknown of it
 CLEAR = 0.7  # share of what is left that another step may leave to be taken instead
 PLAIN = 0.3  # the same where effects have not been looked for: no other flaw goes below 0.75, a coarse step to 0.2
+LATE = "comparator_delay"  # the effect that a coarser step can stand for
+DELAYS = (0.25, 0.5, 1.0, 2.0)  # times that step, from which its fit may begin; a step makes legs late by half of it
 
 
 def find_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int], share: float) -> float | None:
@@ -46,6 +53,26 @@ def tell_step(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int]
     left = {step: misfit_at(plant, noise, point, cycles, (step,)) for step in _steps(plant, FINE)}
     best = min(left, key=lambda step: left[step])
     return best if 0.5 * (now - left[best]) * noise.expected(cycles) > NATS else None
+
+
+def is_coarse(step: float) -> bool:
+    """Whether legs switch later with this step than with the usual ones."""
+    return step > max(STEPS)
+
+
+def find_delay(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int], step: float) -> Point:
+    """`point` with the delay that is likeliest by the usual steps, of those that a coarser step can stand for."""
+    name = f"{LATE}.time"
+    late = [{**point, name: plant.neutral(name) + share * step} for share in DELAYS]
+    return min(late, key=lambda there: misfit_at(plant, noise, there, cycles, STEPS))
+
+
+def weigh_delay(
+    plant: EmaPlant, noises: Sequence[Noise], late: Point, stepped: Point, step: float, cycles: Sequence[int]
+) -> float:
+    """By how much `late` by the usual steps is likelier than `stepped` by a coarser one, over noises. [nats]"""
+    more = (misfit_at(plant, n, stepped, cycles, (step,)) - misfit_at(plant, n, late, cycles, STEPS) for n in noises)
+    return float(np.mean([0.5 * x * n.expected(cycles) for x, n in zip(more, noises, strict=True)]))
 
 
 def take_step(plant: EmaPlant, step: float | None) -> None:

@@ -154,12 +154,12 @@ def _find_path(search: Search) -> tuple[Search, Way, Array | None]:
 def _prefer_fewer_causes(search: Search, path: Way) -> _Answer:
     """What a path found at its minimum, with as few faults and effects as do as well."""
     before, alike = path.before, path.alike
-    after, v = settled, _ = settle_at_minimum(search, path.after, path.verdict)
+    after, v = settled, _ = settle_at_minimum(search, path.after, path.verdict, alike)
     if not path.verdict_before.is_noise:
         after, v = drop_faults(search, before, after, v, alike)
         after, v = simplify(search, before, after, v, alike, path.as_well)
     if after is not settled:
-        after, v = settle_at_minimum(search, after, v)
+        after, v = settle_at_minimum(search, after, v, alike)
     after, v = drop_constant_parts(search, after, v)
     after, v = take_resolver_zero(search, after, v, alike)
     return _Answer(after, v, alike)

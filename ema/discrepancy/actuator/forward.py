@@ -35,7 +35,6 @@ from .weighing import (
 if TYPE_CHECKING:
     from .search import Search
 
-MAX_EFFECTS = 3
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
 NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
 CLOSE = 0.5  # share of what was left, from which another turn is not worth it
@@ -54,7 +53,7 @@ def add_effects(
 ) -> tuple[Model, Verdict]:
     """`after` with as many further effects as are real."""
     left = after.excess
-    while not v.is_noise and len(set(after.names) - {"torque_line"}) < MAX_EFFECTS:  # a second line is no further cause
+    while not v.is_noise and not after.is_full:
         enough = is_enough(after, before)
         screened = rank_to_first_order(search, after)
         models = fit_with_one_more(search, after, screened)
@@ -84,7 +83,8 @@ def add_effects(
         if not v.is_noise:
             after, v = take_bench_conditions(search, after, v, PLAIN)
         if not v.is_noise and after.excess < DISTANT:  # far from noise it is not what is flat that is missing
-            after, v = (settle_at_minimum if after.excess < NEAR else begin_again)(search, after, v)
+            is_near = after.excess < NEAR
+            after, v = settle_at_minimum(search, after, v, alike) if is_near else begin_again(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
 

@@ -20,6 +20,7 @@ K_SEEN = 0.01  # a fault that is there
 CHANCE = 0.03  # difference in misfit that seeds make
 FAR = 100.0  # excess from which candidates are simulated before they are ranked
 DISTANT = 10.0  # excess of a model that is far from the data
+MAX_EFFECTS = 3  # that are looked for
 
 
 @dataclass
@@ -38,6 +39,11 @@ class Model:
     def names(self) -> tuple[str, ...]:
         """Names of the effects."""
         return tuple(c.effect for c in self.effects)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether it has as many effects as are looked for; a second line is no further cause."""
+        return len(set(self.names) - {"torque_line"}) >= MAX_EFFECTS
 
     @property
     def excess(self) -> float:

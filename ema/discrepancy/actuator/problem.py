@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ema.core.names import FAULTS
 from ema.core.records import Array
 from ema.discrepancy.engine.hypothesis import Block, Cause, Parameter, Point
-from ema.discrepancy.engine.posterior import PRIOR
+from ema.discrepancy.engine.posterior import PRIOR, log_prior
 from ema.effects import registry
 
 from .candidates import Candidate
@@ -59,3 +59,13 @@ def as_cause(tried: Candidate) -> Cause:
         usual = abs(p.start - neutral) or 0.1 * (free.high - free.low)
         parameters.append(Parameter(free.name, free.low, free.high, usual, neutral))
     return Cause(effect.name, tuple(parameters), PRIOR)
+
+
+def cost_of(tried: Candidate, sd: Mapping[str, float]) -> float:
+    """By how much likelier a record must be with an effect than without, for it to be as likely as not. [nats]
+
+    An effect is rarely there, and a parameter that the record tells to `sd` might have had any usual size.
+    """
+    cause = as_cause(tried)
+    sizes = (p.usual / max(sd[p.name], 1e-300) for p in cause.parameters)
+    return sum(max(float(np.log(size)), 0.0) for size in sizes) - log_prior((cause,))

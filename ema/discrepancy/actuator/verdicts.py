@@ -7,10 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .comparators import CLEAR, PLAIN, find_step, take_step, tell_step
+from .candidates import candidates
+from .comparators import (
+    CLEAR,
+    LATE,
+    NATS,
+    PLAIN,
+    find_delay,
+    find_step,
+    is_coarse,
+    take_step,
+    tell_step,
+    weigh_delay,
+)
 from .model import CHANCE, DISTANT, Model
 from .noise import N_RUNS, N_RUNS_SURE, Noise, Verdict
+from .problem import cost_of
 from .timing import find_samples_late
+from .weighing import is_credible
 
 if TYPE_CHECKING:
     from .search import Search
@@ -45,19 +59,54 @@ def take_bench_conditions(search: Search, model: Model, v: Verdict, share: float
     return _by_step(search, model, step, N_RUNS_SURE)
 
 
-def settle_at_minimum(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
-    """`model` with faults and effects told apart that look nearly the same, as far as the record allows."""
+def settle_at_minimum(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+    """`model` with faults and effects told apart that look nearly the same, as far as the record allows.
+
+    Legs that follow late come as an effect of their own, with nothing in `alike`.
+    """
     if not model.effects or model.excess > DISTANT or search.is_settled(model):
         return model, v
-    model, v = _at_the_minimum(search, *_by_its_own_step(search, *begin_again(search, model, v)))
+    model, v = _at_the_minimum(search, *_by_its_own_step(search, *begin_again(search, model, v), alike))
     search.minima.append((model.fit, search.noise))
     return model, v
 
 
-def _by_its_own_step(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
-    """`model` with the step of the comparators that the record tells near the truth."""
+def _by_its_own_step(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
+    """`model` with the step of the comparators that the record tells near the truth, and with late legs if likelier."""
     step = tell_step(search.plant, search.noise, model.fit.point, search.train) if search.plant.step is None else None
-    return (model, v) if step is None else _by_step(search, model, step, N_RUNS)
+    if step is None:
+        return model, v
+    usual, late = search.noise, _with_late_legs(search, model, step)
+    stepped, w = _by_step(search, model, step, N_RUNS)
+    if late is None or not _is_likelier(search, late, stepped, step, usual):
+        return stepped, w
+    take_step(search.plant, None)
+    search.noise = Noise(search.plant, late.fit.point)
+    late = search.model(late.effects, late.fit.free, late.fit.point, None, 2)
+    alike.append(())
+    return _by_its_own_step(search, late, search.verdict(late), alike)
+
+
+def _with_late_legs(search: Search, model: Model, step: float) -> Model | None:
+    """`model` with legs that follow late and the usual steps, None where these cannot stand for `step`."""
+    if not is_coarse(step) or LATE in model.names or model.is_full:
+        return None
+    c = next((c for c in candidates(search.plant.plant, search.plant.data, []) if c.effect == LATE), None)
+    if c is None:
+        return None
+    start = find_delay(search.plant, search.noise, model.fit.point, search.train, step)
+    late = search.model((*model.effects, c), (*model.fit.free, *c.frees), start, model.fit.columns, 4)
+    return late if is_credible(late) else None
+
+
+def _is_likelier(search: Search, late: Model, stepped: Model, step: float, usual: Noise) -> bool:
+    """Whether legs that follow late are clearly likelier than a coarser step, which needs no cause."""
+    points = late.fit.point, stepped.fit.point
+    nats = weigh_delay(search.plant, (usual, search.noise), *points, step, search.train)
+    nats -= cost_of(late.effects[-1], late.fit.sd)
+    time = late.fit.point[f"{LATE}.time"]
+    search.say(f"legs {1e6 * time:.2g} µs late instead: {nats:+.0f} nats")
+    return nats > NATS
 
 
 def _by_step(search: Search, model: Model, step: float, n_runs: tuple[int, int]) -> tuple[Model, Verdict]:

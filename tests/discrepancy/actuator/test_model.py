@@ -54,6 +54,12 @@ def test_an_effect_at_the_end_of_what_is_credible_is_no_cause_but_at_nothing_it_
     assert not is_credible(model(late, comparator_delay__time=late.frees[0].high))
 
 
+def test_a_model_of_three_effects_is_full_and_a_second_line_is_no_further_cause():
+    third, line = candidate("inertia.change"), candidate("torque_line.amplitude")
+    assert not model(FLUX, DRAG, line).is_full
+    assert model(FLUX, DRAG, third).is_full
+
+
 def test_enough_is_a_share_of_what_there_was_and_never_far_from_the_data():
     assert is_enough(model(FLUX, heldout=1.2), model(heldout=50.0))
     assert not is_enough(model(FLUX, heldout=20.0), model(heldout=1e6))
