@@ -13,6 +13,7 @@ from ema.core.records import Array
 FALSE_ALARMS = 0.005  # of all tests together
 GROUPS = (1, 8, 64)  # samples averaged before a chi-square: the time scales looked at
 N_LAGS = 8
+MIN_PAIRS = 30  # of residuals, for their correlation to be one of many products
 BOUND = 1.0  # relative uncertainty of an amplitude that is known to its order of magnitude
 CLIP = 5.0  # a single wild sample is not a cause
 
@@ -49,19 +50,20 @@ def scale_test(residuals: Sequence[Array], group: int, noise_uncertainty: float,
 
 
 def correlation_test(residuals: Sequence[Array]) -> float:
-    """P-value of neighbouring residuals being uncorrelated (Ljung and Box over blocks and channels)."""
+    """P-value of neighbouring residuals being uncorrelated (Ljung and Box over blocks and channels).
+
+    Of each lag by the pairs that there are: blocks may be short.
+    """
     n_channels = max((len(block) for block in residuals), default=0)
     statistic, used = 0.0, 0
     for channel in range(n_channels):
         parts = [np.clip(block[channel], -CLIP, CLIP) for block in residuals if channel < len(block)]
-        parts = [x for x in parts if len(x) > 4 * N_LAGS]
-        power = sum(float(x @ x) for x in parts)
-        n = sum(len(x) for x in parts)
-        if not parts or power == 0.0:
-            continue
+        variance = sum(float(x @ x) for x in parts) / max(sum(len(x) for x in parts), 1)
         for lag in range(1, N_LAGS + 1):
-            rho = sum(float(x[lag:] @ x[:-lag]) for x in parts) / power
-            statistic += n * rho**2
+            n = sum(max(len(x) - lag, 0) for x in parts)
+            if n < MIN_PAIRS or variance == 0.0:
+                continue
+            statistic += sum(float(x[lag:] @ x[:-lag]) for x in parts) ** 2 / (n * variance**2)
             used += 1
     return float(stats.chi2.sf(statistic, used)) if used else 1.0
 

@@ -15,6 +15,9 @@ N_BINS = 8
 MAX_SAMPLES = 4000  # of a cycle, to see how a channel was made
 MIN_STEPS = 20  # steps of few counts from which a lattice can be told
 SIMULATED_TO = 3e-4  # of a channel's size: what is lost between samples of the drive
+SENSOR = 2.0**-16  # of a channel's size: the noise of a sensor is no less, that of rounding may be
+ROUNDED = 2.0  # times the rms of steps: noise is the channel's own where it is more
+TURNING = 0.5  # share of neighbours that disagree to the same side: 0.2 of noise, 1 of a smooth channel, 0.5 by chance
 DERIVED = 0.02  # of its noise: what may be left of a speed that is computed from the position
 ESTIMATE_UNCERTAINTY = 0.1  # relative, of an estimated amplitude
 
@@ -31,7 +34,7 @@ class Noise:
         rms of the sampling time. [s]
     declared : bool
     is_bound : bool
-        The channel shows less than what no simulation is expected to be better than.
+        The channel shows no noise of its own, or less than what no simulation is expected to be better than.
     """
 
     sigma: float
@@ -84,18 +87,28 @@ def quantum(x: Array) -> float:
     return step
 
 
-def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None, least: float = 0.0) -> Noise:
+def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None, size: float = 0.0) -> Noise:
     """Estimate from a channel's cycles: robust, rather too large than too small (fast motion counts as noise).
 
-    `least` is what no simulation is expected to be better than.
+    Of a channel of this `size` that shows no noise of its own, a bound is all that is known: what no simulation is
+    expected to be better than.
     """
     everything = np.concatenate([cycle[name] for cycle in cycles])
     step = resolution or max(quantum(cycle[name]) for cycle in cycles)
     of_steps = step / np.sqrt(12.0)
-    floor = max(of_steps, least, 1e-9 * float(np.std(everything)), 1e-12)
+    floor = max(of_steps, 1e-9 * float(np.std(everything)), 1e-12)
     parts = [disagreement(cycle["t"], cycle[name]) for cycle in cycles if cycle.n_samples > 8]
     if not parts:
-        return _at_least(least, floor)
+        return _bounded(floor, 0.0, SIMULATED_TO * size)
+    sigma, jitter = _fit_amplitudes(parts, of_steps, floor)
+    of_its_own = sigma > max(ROUNDED * of_steps, SENSOR * size) and _share_alike(parts) < TURNING
+    return Noise(sigma, jitter) if of_its_own else _bounded(sigma, jitter, SIMULATED_TO * size)
+
+
+def _fit_amplitudes(
+    parts: list[tuple[Array, Array, NDArray[np.int_]]], of_steps: float, floor: float
+) -> tuple[float, float]:
+    """σ₀ and σ_t of what samples disagree by, over parts of like slope."""
     r = np.concatenate([p[0] for p in parts])
     slope = np.abs(np.concatenate([p[1] for p in parts]))
     edges = np.quantile(slope, np.linspace(0.0, 1.0, N_BINS + 1))
@@ -107,14 +120,19 @@ def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None, lea
             square.append(float(np.mean(slope[inside] ** 2)))
             weight.append(1.0 / max(variance[-1], floor**2))
     if not variance:
-        return _at_least(least, max(floor, float(np.sqrt(_robust_variance(r, of_steps)))))
+        return max(floor, float(np.sqrt(_robust_variance(r, of_steps)))), 0.0
     v, s, w = np.array(variance), np.array(square), np.array(weight)
     (a, b), _ = nnls(np.stack([w, w * s], axis=1), w * v)
-    return _at_least(least, max(float(np.sqrt(a)), floor), float(np.sqrt(b)))
+    return max(float(np.sqrt(a)), floor), float(np.sqrt(b))
 
 
-def _at_least(least: float, sigma: float, jitter: float = 0.0) -> Noise:
-    return Noise(sigma, jitter, is_bound=sigma == least)
+def _share_alike(parts: list[tuple[Array, Array, NDArray[np.int_]]]) -> float:
+    """Share of neighbouring samples that disagree with theirs to the same side."""
+    return float(np.mean(np.concatenate([np.sign(r[1:]) == np.sign(r[:-1]) for r, _, _ in parts])))
+
+
+def _bounded(sigma: float, jitter: float, least: float) -> Noise:
+    return Noise(max(sigma, least), jitter, is_bound=sigma <= least)
 
 
 def is_derived(cycle: Cycle, position: str, speed: str) -> bool:

@@ -16,7 +16,7 @@ from ema.effects.base import T_REFERENCE
 from ema.models.axis_config import Axis
 
 from .channels import MIN_SAMPLES, Roles, find_runs, known_load, roles
-from .noise import ESTIMATE_UNCERTAINTY, SIMULATED_TO, Noise, estimate, is_derived
+from .noise import ESTIMATE_UNCERTAINTY, Noise, estimate, is_derived
 
 HALF = 5  # samples on each side of a local quadratic
 WIDTHS = (2 * HALF + 1, 7, 5)  # samples of one from which a window may begin: no wider than the motion lets it
@@ -162,8 +162,8 @@ def _noise(plant: Axis, record: Record, name: str) -> Noise:
     if name in plant.noise:
         return Noise(plant.noise[name], declared=True)
     x = [np.gradient(c[name], c["t"]) * c.period if name in ("theta_m", "q") else c[name] for c in record]
-    least = SIMULATED_TO * float(np.sqrt(np.mean(np.square(np.concatenate(x)))))
-    return estimate(record.cycles, name, record.resolution.get(name), least)
+    size = float(np.sqrt(np.mean(np.square(np.concatenate(x)))))
+    return estimate(record.cycles, name, record.resolution.get(name), size)
 
 
 def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str, Noise]) -> list[Window]:

@@ -14,13 +14,25 @@ from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.verdict import BOUND, judge
 from ema.models.axis_config import RotaryAxis
 
+T = np.arange(2000) * 1e-3
+SMOOTH = 10.0 * np.sin(2.0 * np.pi * T)  # rms 7.1
+
+
+def channel(x) -> tuple[Cycle, ...]:
+    return (Cycle(0, {"t": T, "w_m": x}),)
+
 
 def test_of_a_channel_without_noise_only_a_bound_is_known():
-    t = np.arange(2000) * 1e-3
-    clean = Cycle(0, {"t": t, "w_m": 10.0 * np.sin(2.0 * np.pi * t)})
-    noisy = Cycle(0, {"t": t, "w_m": clean["w_m"] + 0.05 * np.random.default_rng(0).standard_normal(len(t))})
-    assert estimate((clean,), "w_m", None, least=2e-3).is_bound
-    assert not estimate((noisy,), "w_m", None, least=2e-3).is_bound
+    assert estimate(channel(SMOOTH), "w_m", None, size=7.1).is_bound
+    assert estimate(channel(np.round(SMOOTH, 4)), "w_m", None, size=7.1).is_bound  # as it was written
+
+
+@pytest.mark.parametrize("sigma", [0.05, 5e-4])
+def test_a_sensor_may_be_better_than_what_a_simulation_is_expected_to_be(sigma):
+    noisy = SMOOTH + sigma * np.random.default_rng(0).standard_normal(len(T))
+    found = estimate(channel(noisy), "w_m", None, size=7.1)
+    assert not found.is_bound
+    assert found.sigma == pytest.approx(sigma, rel=0.15)
 
 
 def test_what_moves_slowly_within_a_bound_is_no_cause_and_beyond_it_is():
