@@ -61,7 +61,7 @@ def roles(plant: Axis, record: Record) -> Roles:
         raise RecordError(
             f"{record.name}: the axis does not move ({' and '.join(moving)} constant): nothing to compare"
         )
-    load = LOAD_CHANNEL[plant.is_linear] if LOAD_CHANNEL[plant.is_linear] in have else None
+    load = _load(plant, record)
     _finite(record, (drive, *outputs, *([load] if load else [])))
     commanded = kind in ("voltage", "speed-loop") or plant.position_loop is not None  # a drive may go to its limit
     _not_clipped(record, tuple(moving) if commanded else (drive, *moving), position)
@@ -137,6 +137,20 @@ def _in_step(plant: Axis, record: Record, drive: str, speed: str, load: str | No
             f"{record.name}: {speed} runs {abs(shift):.3g} s {'behind' if shift > 0.0 else 'ahead of'} {drive}: the "
             "channels are out of step; record them on one clock"
         )
+
+
+def _load(plant: Axis, record: Record) -> str | None:
+    """Channel of the known load, None without one; RecordError for one that such an axis cannot have."""
+    own, other = LOAD_CHANNEL[plant.is_linear], LOAD_CHANNEL[not plant.is_linear]
+    if own in record.channels:
+        return own
+    if other in record.channels:
+        kind = "linear" if plant.is_linear else "rotary"
+        raise RecordError(
+            f"{record.name}: {other} [{CHANNELS[other].unit}] is no load of a {kind} axis, which takes {own} "
+            f"[{CHANNELS[own].unit}]: map it to that, scaled by its lever, or to `ignore`"
+        )
+    return None
 
 
 def known_load(cycle: Cycle, channel: str | None) -> Array:

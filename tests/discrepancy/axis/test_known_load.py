@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ema.core.errors import RecordError
 from ema.core.records import Record
 from ema.discrepancy.axis.between import examine_ways
 from ema.discrepancy.axis.intake import take_in
@@ -74,3 +75,12 @@ def test_a_load_on_the_users_side_acts_over_the_gear_where_the_motor_is_measured
     np.testing.assert_allclose(taken.cycles[0]["load_torque"], record.cycles[0]["load_torque"] / 5.0)
     (same,) = take_in(geared.model_copy(update={"measured_at": "load"}), [record])
     np.testing.assert_array_equal(same.cycles[0]["load_torque"], record.cycles[0]["load_torque"])
+
+
+def test_a_force_is_no_load_of_a_rotary_axis_and_is_not_left_out_in_silence(axis_bench):
+    cycles = (
+        replace(c, channels={**{n: x for n, x in c.channels.items() if n != "load_torque"}, "load_force": c["t"]})
+        for c in recorded(axis_bench, share=0.0, seed=11)
+    )
+    with pytest.raises(RecordError, match=r"load_force .* takes load_torque"):
+        AxisPlant(RotaryAxis.model_validate(axis_bench.PLANT), [Record(tuple(cycles))])
