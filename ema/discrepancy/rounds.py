@@ -66,11 +66,12 @@ class State:
 
 def is_explained(plant: Plant, plain: Tried, model: Tried) -> bool:
     """Noise is left, or little more, or what the wrong form of the laws found may leave."""
-    if model.rms <= LIMIT:
-        return True
-    if above_noise(model) < FORM**2 * above_noise(plain):
-        return True
-    return judge_model(plant, model).is_noise
+    return above_noise(model) < FORM**2 * above_noise(plain) or is_nearly_noise(plant, model)
+
+
+def is_nearly_noise(plant: Plant, model: Tried) -> bool:
+    """Noise is left, or little more."""
+    return model.rms <= LIMIT or judge_model(plant, model).is_noise
 
 
 def judge_model(plant: Plant, model: Tried) -> Verdict:
@@ -140,9 +141,10 @@ def try_library_alone(plant: Plant, state: State, progress: Progress) -> State:
 def try_together(plant: Plant, state: State, together: Together, progress: Progress) -> State:
     """Effects that were seen beside each other, where those found one by one leave more than noise.
 
-    Of two that are there, neither alone may foretell much, and a third that is not there does what they have in common.
+    Of two that are there, neither alone may foretell much, and a third that is not there does what they have in common:
+    it leaves what looks like the form of a law. Records are not read another way here: that would begin without them.
     """
-    if is_explained(plant, state.plain, state.model):
+    if is_nearly_noise(plant, state.model):
         return state
     found = tuple(together(state.plain.fits[0].point))[:MAX_EFFECTS]
     if len(found) < 2 or {c.key for c in found} <= {c.key for c in state.model.accepted}:
@@ -152,9 +154,7 @@ def try_together(plant: Plant, state: State, together: Together, progress: Progr
     model = fit_model(plant, [found] * N_FOLDS, [[{**own.point, **start}] for own in state.plain.fits])
     if not is_worth_it(model, state.plain):
         return state
-    other = State(
-        state.plain, model, [({}, state.plain)] * len(found), state.tried, state.n_rounds, reread=state.reread
-    )
+    other = State(state.plain, model, [({}, state.plain)] * len(found), state.tried, state.n_rounds)
     revise(plant, other, progress)
     select(plant, other, progress)
     revise(plant, other, progress)

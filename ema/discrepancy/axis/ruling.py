@@ -1,7 +1,8 @@
 """The verdict by the balance of torque, where free runs cannot say.
 
-They know no neighbouring axis, and of an axis that creeps between its moves friction in sliding only, which shows where
-they miss much of its motion. And where noise alone makes much of the motion in a free run, and they are as good with a
+They know no neighbouring axis, and of an axis that creeps between its moves friction in sliding only: where they miss
+much of its motion, or leave it unexplained and more times the noise than the balance does beside the creeping, that one
+rules. And where noise alone makes much of the motion in a free run, and they are as good with a
 law as without it, they are no witness against what the balance sees: the verdict is then its own, of held-out blocks of
 torque, and says so. Where they follow the motion to within little and leave noise, the record is adequate whatever
 small thing the balance holds on to: it smooths what is shorter than its test functions, as the end of a reversal.
@@ -67,8 +68,12 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
         own = [_of_neighbour(b, b.given[0], _share_of_rest(b, b.given[0]))] if _is_seen(b) else []
         own += [_of_neighbour(b, t.law, b.of_set(t)) for t in b.terms if t.law.name == COUPLED and b.of_set(t) >= NAMED]
         return Ruling([*own, *name_laws(plant, b, find_missing(b, []))], _measure_left(plant, b), NEIGHBOUR)
-    if b.creeps and outcome.folds.err_after > WITNESS:
-        return Ruling(name_laws(plant, b, find_missing(b, [])), _measure_left(plant, b), CREEPS.format(b.creeps))
+    if b.creeps:
+        left = _measure_left(plant, b)
+        more = outcome.left.residual.rest > left.residual.rest
+        fails = outcome.verdict in ("partly explained", "unexplained") and more
+        if fails or outcome.folds.err_after > WITNESS:
+            return Ruling(name_laws(plant, b, find_missing(b, [])), left, CREEPS.format(b.creeps))
     is_blind = outcome.verdict == "adequate" and outcome.folds.noise_floor > WITNESS
     named = find_missing(b, []) if is_blind else []
     if named and not _is_refuted(plant, outcome, b):

@@ -28,9 +28,12 @@ def plant_of(module, **hidden):
 FITTED = {"J": 0.14, "F_d": 0.25, "C": 0.02}  # as free runs would
 
 
-def as_free_runs_had(verdict, noise=0.5, missed=0.5):
-    """As free runs of which noise makes a part of the motion, and that miss one."""
-    return SimpleNamespace(verdict=verdict, point=FITTED, folds=SimpleNamespace(noise_floor=noise, err_after=missed))
+def as_free_runs_had(verdict, noise=0.5, missed=0.5, rest=1.0):
+    """As free runs of which noise makes a part of the motion, and that miss one, with a rest of so many times noise."""
+    left = SimpleNamespace(residual=SimpleNamespace(rest=rest))
+    return SimpleNamespace(
+        verdict=verdict, point=FITTED, folds=SimpleNamespace(noise_floor=noise, err_after=missed), left=left
+    )
 
 
 def test_a_law_that_free_runs_are_blind_to_is_named_by_the_balance_which_says_so(short_pendulum):
@@ -66,3 +69,12 @@ def test_of_an_axis_that_creeps_the_balance_speaks_where_free_runs_miss_the_moti
     assert [e.name for e in said.effects] == ["pendulum"]
     assert "creeps in 40%" in said.note
     assert rule_by_balance(plant, as_free_runs_had("explained", noise=0.01, missed=0.01)) is None
+
+
+def test_of_an_axis_that_creeps_the_balance_speaks_where_it_leaves_fewer_times_the_noise(short_pendulum):
+    plant = plant_of(short_pendulum)
+    plant._balances[plant.between] = replace(plant.balance, creeps=0.1)
+    said = rule_by_balance(plant, as_free_runs_had("partly explained", noise=0.01, missed=0.01, rest=25.0))
+    assert [e.name for e in said.effects] == ["pendulum"]
+    assert rule_by_balance(plant, as_free_runs_had("partly explained", noise=0.01, missed=0.01, rest=0.5)) is None
+    assert rule_by_balance(plant, as_free_runs_had("explained", noise=0.01, missed=0.01, rest=25.0)) is None
