@@ -17,7 +17,7 @@ MIN_STEPS = 20  # steps of few counts from which a lattice can be told
 SIMULATED_TO = 3e-4  # of a channel's size: what is lost between samples of the drive
 SENSOR = 2.0**-16  # of a channel's size: the noise of a sensor is no less, that of rounding may be
 ROUNDED = 2.0  # times the rms of steps: noise is the channel's own where it is more
-TURNING = 0.5  # share of neighbours that disagree to the same side: 0.2 of noise, 1 of a smooth channel, 0.5 by chance
+TO_ONE_SIDE = 0.5  # share of neighbours that disagree to the same side: 0.2 of noise, 1 of a smooth channel
 DERIVED = 0.02  # of its noise: what may be left of a speed that is computed from the position
 ESTIMATE_UNCERTAINTY = 0.1  # relative, of an estimated amplitude
 
@@ -100,17 +100,14 @@ def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None, siz
     parts = [disagreement(cycle["t"], cycle[name]) for cycle in cycles if cycle.n_samples > 8]
     if not parts:
         return _bounded(floor, 0.0, SIMULATED_TO * size)
-    sigma, jitter = _fit_amplitudes(parts, of_steps, floor)
-    of_its_own = sigma > max(ROUNDED * of_steps, SENSOR * size) and _share_alike(parts) < TURNING
+    r, slope = [p[0] for p in parts], [p[1] for p in parts]
+    sigma, jitter = _fit_amplitudes(np.concatenate(r), np.abs(np.concatenate(slope)), of_steps, floor)
+    of_its_own = sigma > max(ROUNDED * of_steps, SENSOR * size) and _share_to_one_side(r) < TO_ONE_SIDE
     return Noise(sigma, jitter) if of_its_own else _bounded(sigma, jitter, SIMULATED_TO * size)
 
 
-def _fit_amplitudes(
-    parts: list[tuple[Array, Array, NDArray[np.int_]]], of_steps: float, floor: float
-) -> tuple[float, float]:
-    """σ₀ and σ_t of what samples disagree by, over parts of like slope."""
-    r = np.concatenate([p[0] for p in parts])
-    slope = np.abs(np.concatenate([p[1] for p in parts]))
+def _fit_amplitudes(r: Array, slope: Array, of_steps: float, floor: float) -> tuple[float, float]:
+    """σ₀ and σ_t of what samples disagree by, over those of like `slope` (its size)."""
     edges = np.quantile(slope, np.linspace(0.0, 1.0, N_BINS + 1))
     variance, square, weight = [], [], []
     for low, high in pairwise(edges):
@@ -126,9 +123,9 @@ def _fit_amplitudes(
     return max(float(np.sqrt(a)), floor), float(np.sqrt(b))
 
 
-def _share_alike(parts: list[tuple[Array, Array, NDArray[np.int_]]]) -> float:
-    """Share of neighbouring samples that disagree with theirs to the same side."""
-    return float(np.mean(np.concatenate([np.sign(r[1:]) == np.sign(r[:-1]) for r, _, _ in parts])))
+def _share_to_one_side(r: list[Array]) -> float:
+    """Share of neighbouring samples, in each cycle, that disagree with theirs to the same side."""
+    return float(np.mean(np.concatenate([np.sign(x[1:]) == np.sign(x[:-1]) for x in r])))
 
 
 def _bounded(sigma: float, jitter: float, least: float) -> Noise:

@@ -70,9 +70,9 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
         return Ruling([*own, *name_laws(plant, b, find_missing(b, []))], _measure_left(plant, b), NEIGHBOUR)
     if b.creeps:
         left = _measure_left(plant, b)
-        more = outcome.left.residual.rest > left.residual.rest
-        fails = outcome.verdict in ("partly explained", "unexplained") and more
-        if fails or outcome.folds.err_after > WITNESS:
+        unexplained = outcome.verdict in ("partly explained", "unexplained")
+        leaves_more = outcome.left.residual.rest > left.residual.rest
+        if outcome.folds.err_after > WITNESS or (unexplained and leaves_more):
             return Ruling(name_laws(plant, b, find_missing(b, [])), left, CREEPS.format(b.creeps))
     is_blind = outcome.verdict == "adequate" and outcome.folds.noise_floor > WITNESS
     named = find_missing(b, []) if is_blind else []
