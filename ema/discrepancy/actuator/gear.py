@@ -7,7 +7,8 @@ the user behind a spring is a small model of its own,
 
 (the damper acts where the gap is closed), in which only K/J_u, ζ, C_u/J_u and F_u/J_u matter for θ_u; the torque
 balance of the motor, which accelerates J_u too, then tells J_u. Drag and friction at the user are left out where they
-make little difference.
+make little difference, and so is a reading of θ_u that is late: what turns the phase alone is no drag, which takes from
+the swing too.
 """
 
 from __future__ import annotations
@@ -44,10 +45,11 @@ FREQUENCIES = np.geomspace(100.0, 2000.0, 32)  # [rad/s]
 DAMPINGS = (0.01, 0.03, 0.1, 0.3)
 WIDER = (1.0, 4.0)  # times the nominal backlash
 LEAST_PLAY = 1e-8  # [rad at the user] less is none
-NONE, HELD_BACK = (0.0, 0.0), ((30.0, 1e-3), (30.0, 5.0))  # C_u/J_u [1/s] and F_u/J_u [rad/s²] to begin with
-LOUD = 3.0  # times the noise of θ_u, from where what a user without friction leaves is asked for it
+NONE = (0.0, 0.0, 0.0)  # C_u/J_u [1/s], F_u/J_u [rad/s²] and how late θ_u is read [samples] to begin with
+BESIDE = ((30.0, 1e-3, 0.0), (30.0, 5.0, 0.0), (0.0, 0.0, 2.0), (0.0, 0.0, 10.0))  # where these are asked for
+LOUD = 3.0  # times the noise of θ_u, from where what a gear alone leaves is asked for one of these beside it
 CLEAR = 0.7  # share of the squared gap's change from which a resonance is worth simulating
-CLEARER = 0.2  # of what play or a user without friction leaves, where friction at the user is asked for
+CLEARER = 0.2  # of what play or a gear alone leaves, where one of these is asked for
 INERTIAS = (2e-3, 9.0)  # [kg m²]
 RINGS = 0.4  # damping ratio
 N_CYCLES = 4
@@ -75,13 +77,17 @@ class Resonance(NamedTuple):
 
 
 class Gear(NamedTuple):
-    """What θ_u tells of a gear that gives: √(K/J_u) [rad/s], ζ, b [rad], C_u/J_u [1/s], F_u/J_u [rad/s²]."""
+    """What θ_u tells of a gear that gives: √(K/J_u) [rad/s], ζ, b [rad], C_u/J_u [1/s], F_u/J_u [rad/s²].
+
+    `late` is by how much θ_u is read late. [samples]
+    """
 
     w_0: float
     zeta: float
     b: float
     drag: float = 0.0
     friction: float = 0.0
+    late: float = 0.0
 
     @property
     def rings(self) -> bool:
@@ -92,7 +98,7 @@ class Gear(NamedTuple):
 @njit(cache=True, nogil=True)
 def _user(shaft: Array, start: Array, gear: Gear, T: float) -> Array:
     """θ_u of a user behind a spring, driven by θ_m/GR; `start`: its θ_u and ω_u. [rad]"""
-    w_0, zeta, b, drag, friction = gear
+    w_0, zeta, b, drag, friction, _ = gear
     theta, w = start[0], start[1]
     out = np.empty(len(shaft))
     out[0] = theta
@@ -108,6 +114,11 @@ def _user(shaft: Array, start: Array, gear: Gear, T: float) -> Array:
             theta += dt * w
         out[t] = theta
     return out
+
+
+def _read(shaft: Array, start: Array, gear: Gear, T: float) -> Array:
+    """θ_u of `_user` as it is read. [rad]"""
+    return delayed(_user(shaft, start, gear, T), gear.late)
 
 
 def start_swinging(data: Measured, found: Resonance | None) -> Measured:
@@ -131,7 +142,7 @@ def find_resonance(plant: Actuator, data: Measured) -> Resonance | None:
     starts = data.start[:n, 0].tolist()
     held = min(_left_by_play(shafts, users, starts, b) for b in backlash(plant.transmission.b, PLAYS).tolist())
     if min(left, held) > as_noise:
-        tried = (_gear(plant, shafts, users, data, c, CLEARER * min(left, held)) for c in HELD_BACK)
+        tried = (_gear(plant, shafts, users, data, c, CLEARER * min(left, held)) for c in BESIDE)
         found = min((g for g in tried if g is not None), key=lambda g: g[2], default=found)
     if found is None:
         return None
@@ -157,49 +168,55 @@ def _left_by_play(shafts: list[Array], users: list[Array], starts: list[float], 
 
 
 def _gear(
-    plant: Actuator, shafts: list[Array], users: list[Array], data: Measured, back: tuple[float, float], least: float
+    plant: Actuator,
+    shafts: list[Array],
+    users: list[Array],
+    data: Measured,
+    beside: tuple[float, float, float],
+    least: float,
 ) -> tuple[Gear, Array, float] | None:
-    """A gear and the starts of its user (n_cycles, 2), which leave that much of θ_u, begun with C_u/J_u and F_u/J_u.
+    """A gear and the starts of its user (n_cycles, 2), which leave that much of θ_u, begun with what stands `beside` it.
 
-    None where more than `least` is left, or what is left needs no resonance. Without drag and friction to begin with,
-    these stay zero.
+    None where more than `least` is left, or what is left needs no resonance. What is zero to begin with stays so.
     """
     T = 1.0 / plant.control.rate
     starts = np.stack([data.start[:, 0], data.user_speed], axis=1)
-    free = slice(0, 3 if back == NONE else 5)
+    free = np.flatnonzero([1.0, 1.0, 1.0, *beside])
 
     def gear(x: Array) -> Gear:
-        return Gear(*np.exp(x).tolist())
+        of = np.zeros(len(Gear._fields))
+        of[free] = np.exp(x)
+        return Gear(*of.tolist())
 
     def misfit(g: Gear) -> float:
         if not 0.5 * FREQUENCIES[0] < g.w_0 < 2.0 * FREQUENCIES[-1] or g.zeta > 1.0:
             return np.inf
         cycles = zip(shafts[:N_CYCLES], users, starts, strict=False)
-        return sum(float(np.var(user - _user(shaft, start, g, T))) for shaft, user, start in cycles)
+        return sum(float(np.var(user - _read(shaft, start, g, T))) for shaft, user, start in cycles)
 
     play = max(plant.transmission.b, LEAST_PLAY)
-    grid = [Gear(w, z, play * x, *back) for w in FREQUENCIES for z in DAMPINGS for x in WIDER]
+    grid = [Gear(w, z, play * x, *beside) for w in FREQUENCIES for z in DAMPINGS for x in WIDER]
     best = min(grid, key=misfit)
     left = np.inf
     for _ in range(N_TURNS):  # the gear by the starts, the starts by the gear
         found = minimize(
             lambda x: misfit(gear(x)),
-            np.log(best[free]),
+            np.log(np.array(best)[free]),
             method="Nelder-Mead",
-            options={"maxiter": N_STEPS * free.stop},
+            options={"maxiter": N_STEPS * len(free)},
         )
         best, left = gear(found.x), float(found.fun)
         if left > least:
             return None
         starts = np.array([_fit_start(*of, best, T) for of in zip(shafts, users, starts, strict=True)])
-    return None if back != NONE and not best.rings else (best, starts, left)
+    return None if beside != NONE and not best.rings else (best, starts, left)
 
 
 def _fit_start(shaft: Array, user: Array, start: Array, gear: Gear, T: float) -> Array:
     """θ_u and ω_u with which the first swing comes out as recorded."""
-    n = round(FIRST_SWING / gear.w_0 / T)
+    n = round(FIRST_SWING / gear.w_0 / T + gear.late)
     solved = least_squares(
-        lambda x: _user(shaft[:n], x, gear, T) - user[:n], start, x_scale=(1.0, gear.w_0), xtol=1e-10
+        lambda x: _read(shaft[:n], x, gear, T) - user[:n], start, x_scale=(1.0, gear.w_0), xtol=1e-10
     )
     return np.asarray(solved.x)
 

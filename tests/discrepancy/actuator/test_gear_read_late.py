@@ -1,0 +1,33 @@
+"""A gear that gives, of which the user's position is read late: what only turns the phase is no drag.
+
+The records are of the tests' own simulation, which shares no code with the library.
+"""
+
+from __future__ import annotations
+
+import hidden_actuator as hidden
+import numpy as np
+import pytest
+
+from ema.core import config, resources
+from ema.core.records import Cycle, Record
+from ema.discrepancy.actuator.cycles import prepare
+from ema.discrepancy.actuator.gear import find_resonance
+from ema.models.actuator import Actuator
+
+COMPLIANCE, INERTIA, DAMPER = 3e-5, 0.6, 30.0
+RATIO = DAMPER * 0.5 * np.sqrt(COMPLIANCE / INERTIA)
+
+
+@pytest.mark.parametrize("late", [0.0, 7e-4])
+def test_its_resonance_is_found_as_it_is_however_late_it_is_read(late):
+    flaws = hidden.Flaws(compliance=COMPLIANCE, user_inertia=INERTIA, user_damping=DAMPER, recorder_delay=late)
+    made = hidden.cycles(flaws, 3, 5, hidden.MOTIONS, hidden.Bench())
+    plant = config.load(resources.config("actuator.yaml"), Actuator)
+    data = prepare(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))])
+    found = find_resonance(plant, data)
+    assert found is not None
+    assert found.compliance * found.inertia == pytest.approx(COMPLIANCE * INERTIA, rel=0.02)
+    assert found.damping == pytest.approx(RATIO, rel=0.1)
+    assert found.drag < 1.0  # [N m s/rad]; half of the damper's, or more, where the delay was taken for it
+    assert found.friction < 0.1  # [N m]
