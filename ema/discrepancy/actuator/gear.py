@@ -175,7 +175,7 @@ def _gear(
     beside: tuple[float, float, float],
     least: float,
 ) -> tuple[Gear, Array, float] | None:
-    """A gear and the starts of its user (n_cycles, 2), which leave that much of θ_u, begun with what stands `beside` it.
+    """A gear and the starts of its user (n_cycles, 2), which leave that much of θ_u, begun with what is `beside` it.
 
     None where more than `least` is left, or what is left needs no resonance. What is zero to begin with stays so.
     """
