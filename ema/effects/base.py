@@ -116,6 +116,8 @@ class Effect:
         How a search looks for it on a three-phase actuator, if it need not be seen in the record first.
     on_axis : function AxisSizes → spans of parameters, optional
         Where a search looks for it on an axis, if it need not be seen in the balance of torque first.
+    acts_at_rest : bool
+        Whether it says what friction does before it slides, so that a simulation with it knows an axis that creeps.
     """
 
     name: str
@@ -131,6 +133,7 @@ class Effect:
     place: Literal["plant", "loop", "recorder"] = "plant"
     looks: tuple[Look, ...] = ()
     on_axis: OnAxis | None = None
+    acts_at_rest: bool = False
 
     def __post_init__(self) -> None:
         unknown = set(self.laws) - set(HOOKS)

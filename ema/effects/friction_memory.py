@@ -20,10 +20,12 @@ Al-Bender, Lampaert and Swevers, "The generalized Maxwell-slip model", the same 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from numba import njit
 
 from .base import NOT_NEGATIVE, Effect, Parameter
+from .search import AxisSizes, Span
 
 
 @njit(inline="always")
@@ -45,6 +47,14 @@ def is_slow(F, deflection, inertia, h):
     return deflection > 0.0 and h * h * F < 0.25 * deflection * inertia
 
 
+def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
+    """Over some share of the way between two reversals, and no longer than half of it."""
+    if not s.moves:
+        return None
+    way = s.half_range
+    return {"deflection": Span(0.0, 0.5 * way, (0.002 * way, 0.02 * way, 0.1 * way), 0.01 * way)}
+
+
 EFFECT = Effect(
     name="friction_memory",
     parameters=(
@@ -55,5 +65,7 @@ EFFECT = Effect(
     separated_by="small reversing motions of several amplitudes at several frequencies: memory knows the way only",
     mistaken_for=("k1", "k2"),
     plants=("axis",),
+    on_axis=on_axis,
+    acts_at_rest=True,
     limits={"deflection": NOT_NEGATIVE, "damping": NOT_NEGATIVE},
 )

@@ -1,11 +1,13 @@
 """The verdict by the balance of torque, where free runs cannot say.
 
-They know no neighbouring axis, and of an axis that creeps between its moves friction in sliding only: where they miss
-much of its motion, or leave it unexplained and more times the noise than the balance does beside the creeping, that one
-rules. And where noise alone makes much of the motion in a free run, and they are as good with a
-law as without it, they are no witness against what the balance sees: the verdict is then its own, of held-out blocks of
-torque, and says so. Where they follow the motion to within little and leave noise, the record is adequate whatever
-small thing the balance holds on to: it smooths what is shorter than its test functions, as the end of a reversal.
+They know no neighbouring axis, and of an axis that creeps between its moves friction in sliding only, unless they found
+what it does before it slides and leave little more than noise: where they miss much of its motion, or leave it
+unexplained and more times the noise than the balance does beside the creeping, that one rules. It rules, too, where
+they miss much of the motion and leave more times the noise: what is named there is the best of what does not fit. And
+where noise alone makes much of the motion in a free run, and they are as good with a law as without it, they are no
+witness against what the balance sees: the verdict is then its own, of held-out blocks of torque, and says so. Where
+they follow the motion to within little and leave noise, the record is adequate whatever small thing the balance holds
+on to: it smooths what is shorter than its test functions, as the end of a reversal.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from ema.discrepancy import findings as shared
 from ema.discrepancy.folds import Folds
 from ema.discrepancy.grade import NAMED, UPPER, Left
 from ema.discrepancy.outcome import Outcome
+from ema.effects import registry
 
 from .balance.as_effects import effects, point
 from .balance.found import Balance, draw
@@ -37,6 +40,7 @@ WORSE = 0.1  # of the mean square of the free runs' residual, that a law may add
 WITNESS = 0.1  # of the motion, that free runs which are a witness may miss, or noise make in them
 NEIGHBOUR = "they know nothing of the neighbouring axis"
 CREEPS = "the axis creeps in {:.0%} of the motion, with friction that is not that of sliding, which is all they know"
+MISSES = "they miss {:.0%} of the motion, and the balance leaves fewer times the noise"
 BLIND = "noise makes {:.0%} of the motion in them, and they are no worse with what the balance names than without"
 
 
@@ -68,16 +72,17 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
         own = [_of_neighbour(b, b.given[0], _share_of_rest(b, b.given[0]))] if _is_seen(b) else []
         own += [_of_neighbour(b, t.law, b.of_set(t)) for t in b.terms if t.law.name == COUPLED and b.of_set(t) >= NAMED]
         return Ruling([*own, *name_laws(plant, b, find_missing(b, []))], _measure_left(plant, b), NEIGHBOUR)
-    if b.creeps:
-        left = _measure_left(plant, b)
-        unexplained = outcome.verdict in ("partly explained", "unexplained")
-        leaves_more = outcome.left.residual.rest > left.residual.rest
-        if outcome.folds.err_after > WITNESS or (unexplained and leaves_more):
-            return Ruling(name_laws(plant, b, find_missing(b, [])), left, CREEPS.format(b.creeps))
+    left, missed = _measure_left(plant, b), outcome.folds.err_after
+    unsolved = outcome.verdict in ("partly explained", "unexplained")
+    is_closer = unsolved and left.residual.rest < outcome.left.residual.rest
+    if b.creeps and not _knows_creeping(outcome) and (missed > WITNESS or is_closer):
+        return Ruling(name_laws(plant, b, find_missing(b, [])), left, CREEPS.format(b.creeps))
+    if missed > WITNESS and is_closer:
+        return Ruling(name_laws(plant, b, find_missing(b, [])), left, MISSES.format(missed))
     is_blind = outcome.verdict == "adequate" and outcome.folds.noise_floor > WITNESS
     named = find_missing(b, []) if is_blind else []
     if named and not _is_refuted(plant, outcome, b):
-        return Ruling(name_laws(plant, b, named), _measure_left(plant, b), BLIND.format(outcome.folds.noise_floor))
+        return Ruling(name_laws(plant, b, named), left, BLIND.format(outcome.folds.noise_floor))
     return None
 
 
@@ -100,6 +105,12 @@ def gain(plant: AxisPlant, b: Balance, left: Left, outcome: Outcome) -> shared.G
         folds=folds,
         residual=folds,
     )
+
+
+def _knows_creeping(outcome: Outcome) -> bool:
+    """Whether free runs found what friction does before it slides, and leave little more than noise."""
+    found = any(registry()[e["name"]].acts_at_rest for e in outcome.effects if e["name"] in registry())
+    return found and outcome.left.residual.rest <= outcome.left.allowed
 
 
 def _measure_left(plant: AxisPlant, b: Balance) -> Left:

@@ -27,7 +27,6 @@ SCREENED = (
         "gear_error",
         "quadratic_load_friction",
         "quadratic_output_load_friction",
-        "friction_memory",
     ),
     *("friction_drift", "viscous_drift", "friction_by_temperature", "viscous_by_temperature"),
 )

@@ -9,7 +9,7 @@ import pytest
 
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.axis.ruling import rule_by_balance
-from ema.discrepancy.grade import grade
+from ema.discrepancy.grade import LIMIT, grade
 from ema.models.axis_config import RotaryAxis
 
 QUIET = {"noise": 0.01, "spikes": 0.0, "speed_noise": 0.01}
@@ -28,12 +28,12 @@ def plant_of(module, **hidden):
 FITTED = {"J": 0.14, "F_d": 0.25, "C": 0.02}  # as free runs would
 
 
-def as_free_runs_had(verdict, noise=0.5, missed=0.5, rest=1.0):
+def as_free_runs_had(verdict, noise=0.5, missed=0.5, rest=1.0, named=()):
     """As free runs of which noise makes a part of the motion, and that miss one, with a rest of so many times noise."""
-    left = SimpleNamespace(residual=SimpleNamespace(rest=rest))
-    return SimpleNamespace(
-        verdict=verdict, point=FITTED, folds=SimpleNamespace(noise_floor=noise, err_after=missed), left=left
-    )
+    left = SimpleNamespace(residual=SimpleNamespace(rest=rest), allowed=LIMIT)
+    folds = SimpleNamespace(noise_floor=noise, err_after=missed)
+    effects = [{"name": name} for name in named]
+    return SimpleNamespace(verdict=verdict, point=FITTED, folds=folds, left=left, effects=effects)
 
 
 def test_a_law_that_free_runs_are_blind_to_is_named_by_the_balance_which_says_so(short_pendulum):
@@ -78,3 +78,25 @@ def test_of_an_axis_that_creeps_the_balance_speaks_where_it_leaves_fewer_times_t
     assert [e.name for e in said.effects] == ["pendulum"]
     assert rule_by_balance(plant, as_free_runs_had("partly explained", noise=0.01, missed=0.01, rest=0.5)) is None
     assert rule_by_balance(plant, as_free_runs_had("explained", noise=0.01, missed=0.01, rest=25.0)) is None
+
+
+def test_free_runs_that_know_what_friction_does_before_it_slides_and_leave_little_keep_their_verdict(short_pendulum):
+    plant = plant_of(short_pendulum)
+    plant._balances[plant.between] = replace(plant.balance, creeps=0.1)
+    rest, here = 1.15, {"noise": 0.01, "missed": 0.2}
+    knows = as_free_runs_had("partly explained", **here, rest=rest, named=["friction_memory", "constant_load"])
+    assert rule_by_balance(plant, knows) is None
+    assert rule_by_balance(plant, as_free_runs_had("partly explained", **here, rest=rest, named=["stribeck"]))
+    far = as_free_runs_had("partly explained", **here, rest=25.0, named=["friction_memory"])
+    assert rule_by_balance(plant, far)
+
+
+def test_free_runs_that_miss_much_of_the_motion_have_no_verdict_beside_a_balance_that_is_closer(short_pendulum):
+    plant = plant_of(short_pendulum)
+    assert not plant.balance.creeps
+    said = rule_by_balance(plant, as_free_runs_had("partly explained", noise=0.01, missed=0.5, rest=25.0))
+    assert [e.name for e in said.effects] == ["pendulum"]
+    assert "they miss 50% of the motion" in said.note
+    for other in ({"missed": 0.01}, {"rest": 0.5}, {"verdict": "explained"}):
+        had = as_free_runs_had(**{"verdict": "partly explained", "noise": 0.01, "missed": 0.5, "rest": 25.0} | other)
+        assert rule_by_balance(plant, had) is None, other

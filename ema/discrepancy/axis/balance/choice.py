@@ -12,7 +12,7 @@ from .found import Balance, Term
 from .law import BY_RECORD, BY_RECORD_NAME, Law
 from .links import LINKS
 from .needed import ALARM, SIMPLER, Asked, chance, families_held, is_needed, simpler_families
-from .regression import Corrected, Plain, Regression, regress
+from .regression import Corrected, Plain, Regression, find_impossible, regress
 from .rows import Rows
 
 MOST_LAWS = 8  # a series of lines is one
@@ -236,12 +236,14 @@ def _wins(name: str, model: Regression, rivals: Mapping[str, Regression]) -> dic
 
 
 def _is_ruled_out(found: Rows, plain: Plain, model: Regression, law: Law, rival: Regression) -> bool:
-    """Whether beside the rival this law is needed, and beside this law the rival is not.
+    """Whether the rival asks for a negative inertia, friction or drag, or is idle where this law is not.
 
     Draws of blocks compare what each leaves; of few blocks that says little, where a fit of both says which one is idle
     (Davidson and MacKinnon, "Several tests for model specification in the presence of alternative hypotheses",
     Econometrica 49, 1981).
     """
+    if find_impossible(rival, plain) - find_impossible(model, plain):
+        return True
     other = rival.laws[-1]
     both = regress(found, plain, [*model.laws, other])
     beside = regress(found, plain, [*rival.laws, law])

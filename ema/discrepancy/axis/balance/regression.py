@@ -15,6 +15,7 @@ from .rows import Rows
 
 LEAST = 1e-8  # of the largest eigenvalue, below which a direction rests on the block that is left out alone
 N_ROUNDS = 6  # of laws that depend on what else acts, which depends on them
+BELOW = 2.0  # deviations below zero from which an inertia, a friction or a drag is impossible
 N_FOLDS = 4  # interleaved: each holds out every fourth block
 
 
@@ -110,6 +111,14 @@ class Regression:
         out = np.zeros((len(size), len(size)))
         out[np.ix_(seen, seen)] = moved / np.outer(size[seen], size[seen])
         return out
+
+
+def find_impossible(model: Regression, plain: Plain) -> set[str]:
+    """Those of inertia, dry friction and drag that are clearly below zero."""
+    more = {"dry_friction": plain.F_d, "viscous_drag": plain.C}  # fitted beside the plant file's
+    sd = np.sqrt(np.diag(model.covariance()))
+    of_base = zip(model.base, model.coefficients, sd, strict=False)
+    return {name for name, x, own in of_base if x + more.get(name, 0.0) < -BELOW * own}
 
 
 def regress(rows: Rows, plain: Plain, laws: Sequence[Law], *, apart: bool = False) -> Regression:

@@ -12,9 +12,9 @@ from ema.discrepancy.axis.linear import in_metres
 
 from .found import Balance, Term, draw
 from .law import Law
+from .regression import BELOW
 from .telling_records import OF_BASE, SAID, by_record, quantities, quantity, short
 
-BELOW = 2.0  # deviations below zero from which a value is implausible
 SURE, CONTRADICTED = 0.9, 0.1
 MADE_BY = {  # what makes a fitted value implausible
     "inertia": "a drive's torque that is late, or a gain of it that is wrong",
