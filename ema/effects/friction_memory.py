@@ -52,7 +52,10 @@ def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
     if not s.moves:
         return None
     way = s.half_range
-    return {"deflection": Span(0.0, 0.5 * way, (0.002 * way, 0.02 * way, 0.1 * way), 0.01 * way)}
+    return {
+        "deflection": Span(0.0, 0.5 * way, (0.002 * way, 0.02 * way, 0.1 * way), 0.01 * way),
+        "damping": Span(0.0, 2.0, (0.1,), 0.1),
+    }
 
 
 EFFECT = Effect(

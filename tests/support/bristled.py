@@ -13,7 +13,7 @@ from numba import njit
 from ema.core.records import Cycle, Record
 
 DT, CONTROL = 1e-5, 50  # [s] step, and steps of a control period
-J, C, F_C, F_S, W_S, K_T = 3e-4, 4e-4, 0.05, 0.06, 0.3, 0.06
+J, C, F_C, F_S, W_S, K_T = 3e-4, 4e-4, 0.05, 0.05, 0.3, 0.06
 S_1 = 0.02  # [N m s/rad]
 WAY = 0.004  # [rad] that bristles give
 ENCODER, CURRENT_NOISE, SPEED_NOISE = 2.0 * np.pi / 65536, 0.01, 0.02

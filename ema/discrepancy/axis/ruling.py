@@ -75,9 +75,10 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
     left, missed = _measure_left(plant, b), outcome.folds.err_after
     unsolved = outcome.verdict in ("partly explained", "unexplained")
     is_closer = unsolved and left.residual.rest < outcome.left.residual.rest
-    if b.creeps and not _knows_creeping(outcome) and (missed > WITNESS or is_closer):
+    leave_little = outcome.left.residual.rest <= outcome.left.allowed
+    if b.creeps and not (_know_creeping(outcome) and leave_little) and (missed > WITNESS or is_closer):
         return Ruling(name_laws(plant, b, find_missing(b, [])), left, CREEPS.format(b.creeps))
-    if missed > WITNESS and is_closer:
+    if missed > WITNESS and is_closer and not leave_little:
         return Ruling(name_laws(plant, b, find_missing(b, [])), left, MISSES.format(missed))
     is_blind = outcome.verdict == "adequate" and outcome.folds.noise_floor > WITNESS
     named = find_missing(b, []) if is_blind else []
@@ -107,10 +108,9 @@ def gain(plant: AxisPlant, b: Balance, left: Left, outcome: Outcome) -> shared.G
     )
 
 
-def _knows_creeping(outcome: Outcome) -> bool:
-    """Whether free runs found what friction does before it slides, and leave little more than noise."""
-    found = any(registry()[e["name"]].acts_at_rest for e in outcome.effects if e["name"] in registry())
-    return found and outcome.left.residual.rest <= outcome.left.allowed
+def _know_creeping(outcome: Outcome) -> bool:
+    """Whether free runs found what friction does before it slides."""
+    return any(registry()[e["name"]].acts_at_rest for e in outcome.effects if e["name"] in registry())
 
 
 def _measure_left(plant: AxisPlant, b: Balance) -> Left:
