@@ -10,8 +10,8 @@ from ema.discrepancy import findings as shared
 from ema.discrepancy.grade import NAMED
 from ema.effects import registry
 
-from .balance.as_effects import effects, friction
-from .balance.found import Balance, Term, draw
+from .balance.as_effects import draw_effects, effects, friction
+from .balance.found import Balance, Term
 from .interval import interval
 from .linear import of_axis
 
@@ -42,7 +42,7 @@ def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.Found
     effect, linear = registry()[name], plant.plant.is_linear
     said = partial(of_axis, linear=linear)
     values = effects(b, term)[name]
-    samples = [effects(b, term, c)[name] for c in draw(b)]
+    samples = [drawn[name] for drawn in draw_effects(b, term)]
     units = {p.name: said(p.unit) for p in effect.parameters}
     parameters = {
         key: shared.Quantity(value, *interval(key, value, [s[key] for s in samples]), units[key])

@@ -25,12 +25,12 @@ from ema.discrepancy.outcome import Outcome
 from ema.effects import registry
 
 from .balance.as_effects import effects, point
-from .balance.found import Balance, draw
+from .balance.found import Balance
 from .balance.law import Law
 from .balance.links import COUPLED
 from .balance.needed import ALARM, chance
 from .balance.regression import regress
-from .balance.telling import of_law
+from .balance.telling import of_given
 from .named_laws import find_missing, name_laws
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def _share_of_rest(b: Balance, law: Law) -> float:
 
 def _of_neighbour(b: Balance, law: Law, sure: float) -> shared.FoundEffect:
     """What the neighbour does to this axis as a cause, of which the axis model knows nothing."""
-    told = of_law(b, law, draw(b))
+    told = of_given(b, law)
     return shared.FoundEffect(
         told["name"],
         round(min(sure, 1.0), 4),

@@ -13,29 +13,30 @@ from ema.discrepancy.plant import Point
 from ema.effects.stiffening_spring import EFFECT
 from ema.models.axis_config import LINES
 
-from .found import Balance, Term, draw
+from .found import Balance, Term, draw_law
 from .law import Law
 
 Effects = dict[str, dict[str, float]]
 Values = Mapping[str, float]
 
 
-def effects(b: Balance, term: Term, coefficients: Array | None = None) -> Effects:
-    """Effects with their parameters; empty where the library has none that acts like this law.
-
-    `coefficients`: of the whole model, in place of those that were fitted.
-    """
-    c = b.corrected.coefficients if coefficients is None else coefficients
-    return _of_law(b, term.law, c[b.model.part(term.law)])
+def effects(b: Balance, term: Term) -> Effects:
+    """Effects with their parameters; empty where the library has none that acts like this law."""
+    return _of_law(b, term.law, b.corrected.coefficients[b.model.part(term.law)])
 
 
 def errors(b: Balance, term: Term) -> Effects:
     """Standard deviations of the parameters that `effects` gives."""
-    samples = [effects(b, term, c) for c in draw(b)]
+    samples = draw_effects(b, term)
     return {
         name: {p: float(np.std([own[name][p] for own in samples if name in own])) for p in values}
         for name, values in effects(b, term).items()
     }
+
+
+def draw_effects(b: Balance, term: Term) -> list[Effects]:
+    """What `effects` gives, over draws of the law and its coefficients."""
+    return [_of_law(b, law, c) for law, c in draw_law(b, term)]
 
 
 def find_alternatives(b: Balance, term: Term) -> Effects:

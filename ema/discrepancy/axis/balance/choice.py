@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ema.core.records import Array
+
 from .along import ANY, LINES
 from .found import Balance, Term
 from .law import BY_RECORD, BY_RECORD_NAME, Law
@@ -20,6 +22,7 @@ MOST_LINES = 16  # of one series: each takes a tenth at least of what those befo
 SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
 N_FINER = 5  # times that the step between members of a family is halved
 N_DRAWS = 400  # of blocks, to see how often a law wins
+N_NEAR = 16  # members of a family that are asked how often each leaves least
 EQUAL = 1e-9  # share by which rounding tells two columns apart that are one on these records: the first is taken
 
 
@@ -106,14 +109,19 @@ def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
 def _best_of(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
     if len(members) == 1:
         return members[0]
+    gains = _gains(found, model, members)
+    return members[int(np.argmax(gains >= (1.0 - EQUAL) * gains.max()))]
+
+
+def _gains(found: Rows, model: Regression, members: Sequence[Law]) -> Array:
+    """What each member would take of the square that is left, shape (n_members,)."""
     q, _ = np.linalg.qr(model.design)
     left = model.left - q @ (q.T @ model.left)
     columns = [found.of(law, model.acting) for law in members]
     A = np.array(columns)  # (n_members, n_columns, n_rows)
     A -= (A @ q) @ q.T
     gram, b = A @ A.transpose(0, 2, 1), A @ left
-    gains = np.einsum("mc,mcd,md->m", b, np.linalg.pinv(gram, rcond=1e-6, hermitian=True), b)
-    return members[int(np.argmax(gains >= (1.0 - EQUAL) * gains.max()))]
+    return np.asarray(np.einsum("mc,mcd,md->m", b, np.linalg.pinv(gram, rcond=1e-6, hermitian=True), b))
 
 
 def _best_members(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) -> Regression:
@@ -209,7 +217,21 @@ def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequenc
     alike = {name: wins for name, wins in share.items() if name != law.name and wins > SELDOM}
     common = float(np.mean([model.shared(law, r) for r in others])) if others else 0.0
     power = (without.loss - model.loss) / max(int(found.whole.sum()), 1)
-    return Term(law, power, share[law.name], alike, common, tuple(rivals[name] for name in alike))
+    members = _near_members(found, plain, model, without, law, every)
+    return Term(law, power, share[law.name], alike, common, tuple(rivals[name] for name in alike), members)
+
+
+def _near_members(
+    found: Rows, plain: Plain, model: Regression, without: Regression, law: Law, every: Sequence[Law]
+) -> tuple[tuple[Regression, float], ...]:
+    """Fits with another member of a law's family in its place, and how often each leaves least."""
+    same = [own for own in every if own.family == law.family and own.name == law.name and own.key != law.key]
+    if not same or law.family in LINES:
+        return ()
+    near = np.argsort(-_gains(found, without, same))[:N_NEAR]
+    fits = {same[k].key: regress(found, plain, _add(without, same[k])) for k in near}
+    wins = _wins(law.key, model, fits)
+    return tuple((fit, wins[key]) for key, fit in fits.items() if wins[key] > 0.0)
 
 
 def _simpler_ways(found: Rows, plain: Plain, without: Regression, law: Law, every: Sequence[Law]) -> list[Regression]:

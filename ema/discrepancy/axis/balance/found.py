@@ -27,7 +27,8 @@ class Term:
     `power` is the mean square [N² m² or N²] that held-out blocks lose by it, `alike` what does as well, by how often
     it wins over draws of blocks; `wins` how often this law does. `common` is the share that another law of the
     library has on average in common with this one, on these motions: so much of an unknown rest may be taken for it.
-    `instead` are fits with one of `alike` in its place, which is the last of their laws.
+    `instead` are fits with one of `alike` in its place, which is the last of their laws. `members` are such fits with
+    another member of its family, as the same friction over another way, and how often each leaves least.
     """
 
     law: Law
@@ -36,6 +37,7 @@ class Term:
     alike: dict[str, float]
     common: float
     instead: tuple[Regression, ...] = ()
+    members: tuple[tuple[Regression, float], ...] = ()
 
     @property
     def unseen(self) -> set[str]:
@@ -121,6 +123,21 @@ def draw(b: Balance) -> Array:
             out[lots < wins] += _moved(b.model, rival)
             lots = np.where(lots < wins, 2.0, lots - wins)
     return np.asarray(out)
+
+
+def draw_law(b: Balance, term: Term) -> list[tuple[Law, Array]]:
+    """A law with its coefficients, N_DRAWS times: another member of its family as often as that leaves least."""
+    part = b.model.part(term.law)
+    own = draw(b)[:, part]
+    out = [(term.law, c) for c in own]
+    lots = np.random.default_rng(1).random(N_DRAWS)
+    for fit, wins in term.members:
+        law = fit.laws[-1]
+        moved = fit.coefficients[fit.part(law)] - b.model.coefficients[part]
+        for k in np.flatnonzero(lots < wins):
+            out[k] = (law, own[k] + moved)
+        lots = np.where(lots < wins, 2.0, lots - wins)
+    return out
 
 
 def _moved(model: Regression, rival: Regression) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from ema.core.records import Array
 from ema.discrepancy.axis.interval import interval
 from ema.discrepancy.axis.linear import in_metres
 
-from .found import Balance, Term, draw
+from .found import Balance, Term, draw, draw_law
 from .law import Law
 from .regression import BELOW
 from .telling_records import OF_BASE, SAID, by_record, quantities, quantity, short
@@ -41,8 +42,8 @@ def describe(b: Balance, *, linear: bool) -> dict[str, Any]:
         "rows": len(b.model.rows.y),
         "test_function": short(2.0 * b.model.rows.half),
         "base": {name: _base(b, k, name, samples, linear) for k, name in enumerate(b.model.base)},
-        **({"given": [of_law(b, law, samples) for law in b.given]} if b.given else {}),
-        "terms": [_term(b, term, samples) for term in b.terms],
+        **({"given": [of_given(b, law) for law in b.given]} if b.given else {}),
+        "terms": [_term(b, term) for term in b.terms],
         **({"creeps": short(b.creeps)} if b.creeps else {}),
         **({"by_record": by_record(b.agreements, b.model.rows.motion.records, linear=linear)} if b.agreements else {}),
     }
@@ -63,21 +64,25 @@ def _base(b: Balance, k: int, name: str, samples: Array, linear: bool) -> dict[s
     return out
 
 
-def of_law(b: Balance, law: Law, samples: Array) -> dict[str, Any]:
-    """A law with its parameters."""
-    part = b.model.part(law)
-    values = law.values(b.corrected.coefficients[part])
+def of_law(b: Balance, law: Law, drawn: Sequence[tuple[Law, Array]]) -> dict[str, Any]:
+    """A law with its parameters, and their intervals of what was `drawn`."""
+    values = law.values(b.corrected.coefficients[b.model.part(law)])
     return {
         "name": law.name,
-        "parameters": quantities(law, values, [law.values(c) for c in samples[:, part]]),
+        "parameters": quantities(law, values, [own.values(c) for own, c in drawn]),
         "sentence": law.sentence.format(**values),
     }
 
 
-def _term(b: Balance, term: Term, samples: Array) -> dict[str, Any]:
+def of_given(b: Balance, law: Law) -> dict[str, Any]:
+    """The same of a law that the plant file declares."""
+    return of_law(b, law, [(law, c) for c in draw(b)[:, b.model.part(law)]])
+
+
+def _term(b: Balance, term: Term) -> dict[str, Any]:
     values = term.law.values(b.corrected.coefficients[b.model.part(term.law)])
     out = {
-        **of_law(b, term.law, samples),
+        **of_law(b, term.law, draw_law(b, term)),
         "confidence": round(b.confidence(term), 4),
         "indistinguishable_from": list(term.others),
         "separated_by": term.law.separated_by,
