@@ -26,7 +26,7 @@ MODES = {
 }
 BETWEEN = {"straight": kernel.STRAIGHT, "held": kernel.HELD, "held before": kernel.HELD_BEFORE, "fast": kernel.FAST}
 Effects = Mapping[str, Mapping[str, float]]
-State = tuple[float, float]
+State = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -197,12 +197,11 @@ def _after(
     begin: Callable[[int], State],
     along: Callable[[slice, State], State],
 ) -> Array:
-    """The state, shape (n, 2), at the end of each motion; one that follows begins where the last one ended."""
-    out, state = np.empty((len(follows), 2)), (0.0, 0.0)
+    """The state, shape (n, n_states), at the end of each motion; one that follows begins where the last one ended."""
+    out: list[State] = []
     for j, (first, end) in enumerate(itertools.pairwise(offsets.tolist())):
-        state = along(slice(first, end), state if follows[j] else begin(first))
-        out[j] = state
-    return out
+        out.append(along(slice(first, end), out[-1] if follows[j] and out else begin(first)))
+    return np.array(out)
 
 
 def has_memory(numbers: Model) -> bool:
@@ -227,7 +226,7 @@ def bristles_after(
     def along(of: slice, bristle: State) -> State:
         return kernel.bristle_after(numbers.z, theta[of], play, *bristle)
 
-    return _after(offsets, follows, lambda first: (0.0, theta[first]), along)[:, 0]
+    return _after(offsets, follows, lambda first: (0.0, theta[first], 0.0), along)[:, 0]
 
 
 def built_up(numbers: Model, share: float, way: float) -> float:

@@ -22,7 +22,6 @@ import math
 from numba import njit
 
 from ema.effects import cogging, friction_memory, inverter_drop, supply_sag, torque_term
-from ema.effects.backlash import follow
 from ema.effects.dry_friction import rubbing_speed_after, speed_after
 
 from . import jit  # noqa: F401  (sets the cache folder before anything is compiled)
@@ -200,17 +199,18 @@ def beyond_after(z, mode, between, t, theta, drive, load, h_max, theta_b, w_b):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def bristle_after(z, theta, play, s, seen):
+def bristle_after(z, theta, play, s, seen, way):
     """Share of friction that is built up, given at `seen`, at the end of a recorded motion with noise within ±`play`.
 
-    Also the angle that is `seen` there.
+    Also the angle that is `seen` there, and which `way` it went last: 1, -1, or 0 before the first. What noise can
+    make is no turn; what is more is one, and counts whole.
     """
     for k in range(theta.shape[0]):
-        moved = follow(seen, theta[k], play) - seen
-        if moved != 0.0:
+        moved = theta[k] - seen
+        if moved * way > 0.0 or abs(moved) > 2.0 * play:
             s = friction_memory.built_up(s, moved, z[DEFLECTION])
-        seen += moved
-    return s, seen
+            seen, way = theta[k], 1.0 if moved > 0.0 else -1.0
+    return s, seen, way
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)

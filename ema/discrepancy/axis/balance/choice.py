@@ -14,7 +14,7 @@ from .found import Balance, Term
 from .law import BY_RECORD, BY_RECORD_NAME, Law
 from .links import LINKS
 from .needed import ALARM, SIMPLER, Asked, chance, families_held, is_needed, simpler_families
-from .regression import Corrected, Plain, Regression, find_impossible, regress
+from .regression import Corrected, Plain, Regression, regress, turns_inertia
 from .rows import Rows
 
 MOST_LAWS = 8  # a series of lines is one
@@ -80,7 +80,7 @@ def _smallest(trials: Sequence[Regression], best: Regression, asked: Asked) -> R
 
 
 def _try_each(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) -> list[Regression]:
-    """The model with one law more: of each family that is not in it the member that fits best."""
+    """The model with one law more: of each family that is not in it the member that fits best, if that is a machine."""
     have = {law.key for law in model.laws}
     single = {law.family for law in model.laws if law.family not in LINES}
     single |= {other for law in model.laws for other in families_held(law.family) if other not in LINES}
@@ -89,7 +89,8 @@ def _try_each(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]
     for law in every:
         if law.key not in have and law.family not in single:
             members.setdefault(law.family, []).append(law)
-    return [regress(found, plain, _add(model, _best(found, model, own))) for own in members.values()]
+    trials = [regress(found, plain, _add(model, _best(found, model, own))) for own in members.values()]
+    return [r for r in trials if not turns_inertia(model, r)]
 
 
 def _add(model: Regression, law: Law) -> list[Law]:
@@ -138,7 +139,7 @@ def _best_members(found: Rows, plain: Plain, model: Regression, every: Sequence[
         model = other if other.loss < model.loss else model
         for own in members if law.needs_acting else ():
             other = regress(found, plain, _add(without, own))
-            if _wins(law.name, model, {own.key: other})[law.name] <= SELDOM:
+            if _wins(law.name, model, {own.key: other})[law.name] <= SELDOM and not turns_inertia(model, other):
                 model = other
     return model
 
@@ -258,14 +259,12 @@ def _wins(name: str, model: Regression, rivals: Mapping[str, Regression]) -> dic
 
 
 def _is_ruled_out(found: Rows, plain: Plain, model: Regression, law: Law, rival: Regression) -> bool:
-    """Whether the rival asks for a negative inertia, friction or drag, or is idle where this law is not.
+    """Whether beside the rival this law is needed, and beside this law the rival is not.
 
     Draws of blocks compare what each leaves; of few blocks that says little, where a fit of both says which one is idle
     (Davidson and MacKinnon, "Several tests for model specification in the presence of alternative hypotheses",
     Econometrica 49, 1981).
     """
-    if find_impossible(rival, plain) - find_impossible(model, plain):
-        return True
     other = rival.laws[-1]
     both = regress(found, plain, [*model.laws, other])
     beside = regress(found, plain, [*rival.laws, law])

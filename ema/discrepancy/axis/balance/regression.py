@@ -113,12 +113,18 @@ class Regression:
         return out
 
 
-def find_impossible(model: Regression, plain: Plain) -> set[str]:
-    """Those of inertia, dry friction and drag that are clearly below zero."""
-    more = {"dry_friction": plain.F_d, "viscous_drag": plain.C}  # fitted beside the plant file's
-    sd = np.sqrt(np.diag(model.covariance()))
-    of_base = zip(model.base, model.coefficients, sd, strict=False)
-    return {name for name, x, own in of_base if x + more.get(name, 0.0) < -BELOW * own}
+def turns_inertia(model: Regression, other: Regression) -> bool:
+    """Whether the inertia, clearly above zero in `model`, is below it in `other`, which then is no machine.
+
+    Friction by a share of what drives can take the place of all that the drive is needed for, with the other sign.
+    """
+    if "inertia" not in model.base or "inertia" not in other.base:
+        return False
+    at, there = model.base.index("inertia"), other.base.index("inertia")
+    value, turned = model.coefficients[at], other.coefficients[there]
+    if not turned < 0.0 < value:
+        return False
+    return bool(value > BELOW * model.covariance()[at, at] ** 0.5)
 
 
 def regress(rows: Rows, plain: Plain, laws: Sequence[Law], *, apart: bool = False) -> Regression:
