@@ -77,13 +77,14 @@ def outcome(t: strata_axis.Trial, findings: dict[str, Any]) -> str:
     """How the finder did: right, in set, wrong, missed."""
     sets = [{e["name"], *e["indistinguishable_from"]} for e in findings["effects"]]
     sets = [s | {strata_axis.ALSO[name] for name in s & set(t.near) & set(strata_axis.ALSO)} for s in sets]
-    wanted = set(t.effects)
+    named, wanted = len(sets), set(t.effects)
+    sets = [s for s in sets if not s & set(t.there)]
     if not wanted and t.kind in strata_axis.OUTSIDE:
         is_near = bool(sets) and all(s & set(t.near) for s in sets)
         said = "right" if is_near or (findings["verdict"] == "unexplained" and not sets) else "wrong"
         return "missed" if findings["verdict"] == "adequate" else said
     if not wanted:
-        return "right" if findings["verdict"] == "adequate" else "wrong"
+        return "right" if findings["verdict"] == "adequate" or (named and not sets) else "wrong"
     if not sets:
         return "missed"
     if not all(s & wanted for s in sets):

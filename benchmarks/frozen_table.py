@@ -84,7 +84,7 @@ def truth(row: Row) -> set[str]:
 def _answers(rows: Iterable[Row]) -> list[tuple[float, bool]]:
     """Stated probability of each named effect or set, and whether a true one, or what acts like it, is in it."""
     return [
-        (p, bool(set(named) & (truth(row) | set(row.get("near", ())))))
+        (p, bool(set(named) & (truth(row) | {*row.get("near", ()), *row.get("there", ())})))
         for row in rows
         for named, p in zip(row["named"], _of_sets(row), strict=True)
     ]
@@ -95,6 +95,11 @@ def _of_sets(row: Row) -> list[float]:
     told = row.get("of_set") or [None] * len(row["named"])
     shares = zip(told, row["named"], row["confidence"], strict=True)
     return [min(1.0, p * len(named)) if of_set is None else of_set for of_set, named, p in shares]
+
+
+def _is_alarm(row: Row) -> bool:
+    """Whether something is told of a bench without what is told: what it has of its own may be."""
+    return bool(row["verdict"] != "adequate" and not (row.get("there") and row["outcome"] == "right"))
 
 
 def reliability(answers: Sequence[tuple[float, bool]]) -> list[tuple[str, str, str]]:
@@ -153,7 +158,7 @@ def _aims(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
         ("hidden and not to be seen", f"{len(hiding) - len(visible)} of {len(hiding)}", ""),
         ("two or three at once, named or in sets", rate(len(both), len(several)), "≥ 95 %"),
         (f"confidently wrong (P ≥ {CONFIDENT:g}, extra effects included)", rate(len(wrong), len(rows)), "≤ 0.5 %"),
-        ("false alarms", rate(sum(r["verdict"] != "adequate" for r in silent), len(silent)), "none"),
+        ("false alarms", rate(sum(_is_alarm(row) for row in silent), len(silent)), "none"),
         (f"outside the library ({len(kinds)} kinds), said so", rate(len(said), len(outside)), "≥ 95 %"),
         *((what, share, "± 4 points") for what, share in coverage(z)),
         ("trials with a fault above 1 % that is not there", rate(len(false), len(known)), "≤ 1 %"),

@@ -51,7 +51,8 @@ EXACT = {"cogging.amplitude", "asymmetric_friction.asymmetry", "constant_load.to
 class Trial:
     """Records with their plant file; `effects` are those hidden, of the library's, and `truth` their exact values.
 
-    `near`: effects of the library that act like what is hidden and is none of them. `without` makes the records again
+    `near`: effects of the library that act like what is hidden and is none of them. `there`: what the bench has of its
+    own besides, seen or not, and what may be named. `without` makes the records again
     without noise and without one of the effects, or with all (""); `noise` is each channel's rms.
     """
 
@@ -64,11 +65,17 @@ class Trial:
     near: tuple[str, ...] = ()
     without: Callable[[str], Record] | None = None
     noise: Mapping[str, float] = field(default_factory=dict)
+    there: tuple[str, ...] = ()
 
     @property
     def told(self) -> dict[str, Any]:
         """What is hidden, for the trial's row."""
-        hidden = {"effects": list(self.effects), "near": list(self.near), "hidden": self.truth}
+        hidden = {
+            "effects": list(self.effects),
+            "near": list(self.near),
+            "there": list(self.there),
+            "hidden": self.truth,
+        }
         return {"case": self.case, "plant": self.plant, **hidden}
 
     @property
@@ -215,7 +222,7 @@ SPOIL: dict[str, Callable[[Cycle], Cycle]] = {
 
 
 def _other(number: int, seed: int, plant: str) -> Trial:
-    """Axes of another simulator (bristles, encoders, masses), with one of its effects or none."""
+    """Axes of another simulator (bristles, encoders, masses), with one of its effects or none; bristles are there."""
     name = list(axis_other.SETUPS)[number % len(axis_other.SETUPS)]
     rng = np.random.default_rng(seed)
     hidden = [0.0] * 8
@@ -230,7 +237,8 @@ def _other(number: int, seed: int, plant: str) -> Trial:
         effects, truth = ["asymmetric_friction"], {"asymmetric_friction.asymmetry": hidden[axis_other.ASYMMETRY]}
     record = axis_other.record(replace(setup, hidden=tuple(hidden)), seed % 100_000)
     case = "+".join(effects) or "nothing"
-    return Trial(f"{case}, {name}", name, dict(axis_other.plant(setup)), (record,), tuple(effects), truth)
+    file, there = dict(axis_other.plant(setup)), ("friction_memory",)
+    return Trial(f"{case}, {name}", name, file, (record,), tuple(effects), truth, there=there)
 
 
 def _loops(number: int, seed: int, plant: str) -> Trial:

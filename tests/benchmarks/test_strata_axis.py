@@ -118,3 +118,16 @@ def test_a_spring_that_stiffens_is_right_where_the_hidden_one_does_and_wrong_els
     assert frozen_axis.outcome(spring, named("spring_load")) == "right"
     assert frozen_axis.outcome(spring, named("pendulum")) == "wrong"
     assert frozen_axis.outcome(drag, named("stiffening_spring")) == "wrong"
+
+
+def test_bristles_that_a_bench_has_of_its_own_may_be_named_and_nothing_else():
+    setups = len(strata_axis.axis_other.SETUPS)
+    nothing = next(t for n in range(9 * setups) if not (t := strata_axis.drawn("other makers", n, n)).effects)
+
+    def named(*names, verdict="partly explained"):
+        return {"effects": [{"name": n, "indistinguishable_from": []} for n in names], "verdict": verdict}
+
+    assert frozen_axis.outcome(nothing, named("friction_memory")) == "right"
+    assert frozen_axis.outcome(nothing, named("friction_memory", "stribeck")) == "wrong"
+    assert frozen_axis.outcome(nothing, named(verdict="unexplained")) == "wrong"
+    assert frozen_axis.outcome(nothing, named(verdict="adequate")) == "right"
