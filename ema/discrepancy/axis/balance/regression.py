@@ -15,7 +15,7 @@ from .rows import Rows
 
 LEAST = 1e-8  # of the largest eigenvalue, below which a direction rests on the block that is left out alone
 N_ROUNDS = 6  # of laws that depend on what else acts, which depends on them
-BELOW = 2.0  # deviations below zero from which an inertia, a friction or a drag is impossible
+BELOW = 2.0  # deviations from zero, from which the sign of an inertia, a friction or a drag is sure
 N_FOLDS = 4  # interleaved: each holds out every fourth block
 
 
