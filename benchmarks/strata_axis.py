@@ -52,8 +52,8 @@ class Trial:
     """Records with their plant file; `effects` are those hidden, of the library's, and `truth` their exact values.
 
     `near`: effects of the library that act like what is hidden and is none of them. `there`: what the bench has of its
-    own besides, seen or not, and what may be named. `without` makes the records again
-    without noise and without one of the effects, or with all (""); `noise` is each channel's rms.
+    own besides, seen or not, and what may be named. `without` makes the records again without noise and without one of
+    the effects, or with all (""); `noise` is each channel's rms.
     """
 
     case: str

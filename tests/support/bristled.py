@@ -1,8 +1,8 @@
 """A motor on bristles (LuGre) beside a constant load, under a position loop: its own simulation, in steps of 10 µs.
 
-    dz/dt = ω - σ_0 |ω| z / g(ω),   τ_f = σ_0 z + σ_1 dz/dt + C ω,   g = F_c + (F_s - F_c) exp(-(ω/ω_s)²)
+    dz/dt = ω - σ_0 |ω| z / F,   τ_f = σ_0 z + σ_1 dz/dt + C ω
 
-The bristles give by F_c/σ_0 before they slide. Shares no code with the models that are tested.
+The bristles give by F/σ_0 before they slide. Shares no code with the models that are tested.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numba import njit
 from ema.core.records import Cycle, Record
 
 DT, CONTROL = 1e-5, 50  # [s] step, and steps of a control period
-J, C, F_C, F_S, W_S, K_T = 3e-4, 4e-4, 0.05, 0.05, 0.3, 0.06
+J, C, F_C, K_T = 3e-4, 4e-4, 0.05, 0.06
 S_1 = 0.02  # [N m s/rad]
 WAY = 0.004  # [rad] that bristles give
 ENCODER, CURRENT_NOISE, SPEED_NOISE = 2.0 * np.pi / 65536, 0.01, 0.02
@@ -29,8 +29,7 @@ def _run(reference, speed, load, s_0):
         if k % CONTROL == 0:
             i = min(max(12.0 * (reference[k] - theta) + 0.35 * (speed[k] - w), -8.0), 8.0)
         out[:, k] = theta, w, i
-        g = F_C + (F_S - F_C) * np.exp(-((w / W_S) ** 2))
-        dz = w - s_0 * abs(w) / g * z
+        dz = w - s_0 * abs(w) / F_C * z
         friction = s_0 * z + S_1 * dz + C * w
         z += DT * dz
         w += DT * (K_T * i - friction - load) / J
