@@ -23,6 +23,18 @@ def with_angles(record, change):
     return Record(tuple(Cycle(c.number, {**c.channels, "theta_m": change(c["theta_m"])}) for c in record))
 
 
+def besides_bristles(outcome, setup):
+    """The effects told, without the bristles that every axis of this simulation has; told, they are as long as these."""
+    others = []
+    for effect in outcome.effects:
+        if effect["name"] != "friction_memory":
+            others.append(effect)
+            continue
+        deflection = effect["parameters"]["deflection"]
+        assert deflection["low"] <= setup.bristle <= deflection["high"]
+    return others
+
+
 def look_at(axis_other, setup, *, angles=None, fitted=(), **hidden):
     values = [0.0] * 8
     for key, value in hidden.items():
@@ -70,8 +82,10 @@ def test_a_drive_that_is_held_between_samples_is_a_condition_and_no_late_sensor(
 @pytest.mark.slow
 def test_an_effect_far_above_the_noise_does_not_hide_that_the_drive_is_held(axis_other):
     outcome = look(axis_other, "stage", held=True, VISCOUS=10.0)
-    assert [e["name"] for e in outcome.effects] == ["viscous_drag"]
-    assert outcome.effects[0]["parameters"]["coefficient"]["value"] == pytest.approx(10.0, rel=0.03)
+    (found,) = besides_bristles(outcome, axis_other.SETUPS["stage"])
+    assert found["name"] == "viscous_drag"
+    assert found["confidence"] > 0.9
+    assert found["parameters"]["coefficient"]["value"] == pytest.approx(10.0, rel=0.03)
     assert any("held until the next" in note for note in outcome.notes)
 
 
