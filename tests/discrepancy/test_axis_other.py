@@ -25,14 +25,9 @@ def with_angles(record, change):
 
 def besides_bristles(outcome, setup):
     """The effects told, without the bristles that every axis of this simulation has; told, they are as long as these."""
-    others = []
-    for effect in outcome.effects:
-        if effect["name"] != "friction_memory":
-            others.append(effect)
-            continue
-        deflection = effect["parameters"]["deflection"]
-        assert deflection["low"] <= setup.bristle <= deflection["high"]
-    return others
+    own = [e["parameters"]["deflection"] for e in outcome.effects if e["name"] == "friction_memory"]
+    assert all(deflection["low"] <= setup.bristle <= deflection["high"] for deflection in own)
+    return [e for e in outcome.effects if e["name"] != "friction_memory"]
 
 
 def look_at(axis_other, setup, *, angles=None, fitted=(), **hidden):
