@@ -24,7 +24,7 @@ def with_angles(record, change):
 
 
 def besides_bristles(outcome, setup):
-    """The effects told, without the bristles that every axis of this simulation has; told, they are as long as these."""
+    """The effects told, less the bristles that each axis of this simulation has; if told, they are as long as these."""
     own = [e["parameters"]["deflection"] for e in outcome.effects if e["name"] == "friction_memory"]
     assert all(deflection["low"] <= setup.bristle <= deflection["high"] for deflection in own)
     return [e for e in outcome.effects if e["name"] != "friction_memory"]
