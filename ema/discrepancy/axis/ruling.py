@@ -12,6 +12,7 @@ on to: it smooths what is shorter than its test functions, as the end of a rever
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,7 @@ from ema.discrepancy.outcome import Outcome
 from ema.effects import registry
 
 from .balance.as_effects import effects, point
-from .balance.found import Balance
+from .balance.found import Balance, Term
 from .balance.law import Law
 from .balance.links import COUPLED
 from .balance.needed import ALARM, chance
@@ -72,19 +73,25 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
         own = [_of_neighbour(b, b.given[0], _share_of_rest(b, b.given[0]))] if _is_seen(b) else []
         own += [_of_neighbour(b, t.law, b.of_set(t)) for t in b.terms if t.law.name == COUPLED and b.of_set(t) >= NAMED]
         return Ruling([*own, *name_laws(plant, b, find_missing(b, []))], _measure_left(plant, b), NEIGHBOUR)
-    left, missed = _measure_left(plant, b), outcome.folds.err_after
+    left, missing = _measure_left(plant, b), find_missing(b, [])
+    why = _why_it_rules(plant, outcome, b, left, missing)
+    return Ruling(name_laws(plant, b, missing), left, why) if why else None
+
+
+def _why_it_rules(plant: AxisPlant, outcome: Outcome, b: Balance, left: Left, missing: Sequence[Term]) -> str:
+    """What keeps free runs from being a witness against the balance, in words; empty where nothing does."""
+    missed = outcome.folds.err_after
     unsolved = outcome.verdict in ("partly explained", "unexplained")
     is_closer = unsolved and left.residual.rest < outcome.left.residual.rest
     leave_little = outcome.left.residual.rest <= outcome.left.allowed
     if b.creeps and not (_know_creeping(outcome) and leave_little) and (missed > WITNESS or is_closer):
-        return Ruling(name_laws(plant, b, find_missing(b, [])), left, CREEPS.format(b.creeps))
+        return CREEPS.format(b.creeps)
     if missed > WITNESS and is_closer and not leave_little:
-        return Ruling(name_laws(plant, b, find_missing(b, [])), left, MISSES.format(missed))
+        return MISSES.format(missed)
     is_blind = outcome.verdict == "adequate" and outcome.folds.noise_floor > WITNESS
-    named = find_missing(b, []) if is_blind else []
-    if named and not _is_refuted(plant, outcome, b):
-        return Ruling(name_laws(plant, b, named), left, BLIND.format(outcome.folds.noise_floor))
-    return None
+    if is_blind and missing and not _is_refuted(plant, outcome, b):
+        return BLIND.format(outcome.folds.noise_floor)
+    return ""
 
 
 def gain(plant: AxisPlant, b: Balance, left: Left, outcome: Outcome) -> shared.Gain:
