@@ -86,6 +86,14 @@ class Candidate:
         frees = [replace(f, step=factor * f.step) if f.name.split(".")[1] in self.linear else f for f in self.frees]
         return replace(self, steps=tuple(steps.tolist()), frees=tuple(frees))
 
+    def sized(self, values: Array) -> Candidate:
+        """The same with steps as long, on average, as values of the linear parameters (less neutral), to their side."""
+        low, high = self.limits()
+        size = float(np.sqrt(np.mean((values / self.amounts) ** 2)))
+        steps = np.clip(np.copysign(size * self.amounts, values), low, high)
+        neutral = np.array(self.steps) - self.amounts
+        return replace(self, steps=tuple((neutral + steps).tolist()))
+
     def limits(self) -> tuple[Array, Array]:
         """Bounds of the linear parameters, less neutral."""
         parameters = {p.name: p for p in registry()[self.effect].parameters}

@@ -12,9 +12,9 @@ from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
 from .candidates import Candidate, candidates
-from .fit import SEED, bounds, residuals, solve_within_bounds, stacked_jacobian, step_to
+from .fit import SEED, bounds, residuals, residuals_at, solve_within_bounds, stacked_jacobian, step_to
 from .free import Free
-from .model import FAR, N_GLANCE, N_GLANCE_FAR, Model, strip
+from .model import DISTANT, FAR, N_GLANCE, N_GLANCE_FAR, Model, strip
 from .weighing import within_reach
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ FELT = 0.5  # cosine between halves of the seeds, below which a column is mostly
 DT_PROBE = 2e-6  # [s] step of a simulation that only screens: its columns are within 4 % (12 % for dead time)
 AT_LEAST = 0.01  # share of the whole squared residual that it must promise
 COLLINEAR = 0.8  # cosine from which two effects look like each other
-CURVED = 0.2  # share of what an effect does, by which first order may be off where another stands in its place
-RESEMBLING = 0.3  # cosine by probes at the nominal point, from which they are compared where the fit is
+CURVED = 0.2  # share of what an effect does, by which a start with another in its place may be off
+RESEMBLING = 0.3  # cosine by probes at the nominal point, from which another is tried where the fit is
 
 
 class Screened(NamedTuple):
@@ -161,10 +161,9 @@ def find_look_alikes(
 ) -> list[Screened]:
     """Those that can do, beside what else is free, nearly all that the last effect of `best` does.
 
-    What probes do where nothing else acts may mislead: what resembles the effect there is asked once more where
-    `best` is, and begins with what does the same there. So is what was fitted already, if the effect has taken the
-    place of faults: from these no fit gets there. With `only_there` all are asked, and begin, where `best` is, unless
-    first order, which may be off there by a share of what the effect does, says that they stay out of its reach.
+    What probes do where nothing else acts may mislead: what resembles the effect there begins where `best` is without
+    it, with what by first order does the same there, and what this leaves is simulated. So is what was fitted already,
+    if the effect has taken the place of faults: from these no fit gets there. With `only_there` all are asked there.
     """
     effect = best.effects[-1]
     names = [f"{effect.effect}.{name}" for name in effect.linear]
@@ -172,32 +171,55 @@ def find_look_alikes(
     frees = [f for f in best.fit.free if f.name in names]
     done = stacked_jacobian(search.noise, frees, best.fit.columns, search.train) @ values
     replaced = effect.faults if model.shows_faults_of(effect) else []
-    others, rest = strip(best, effect)[1:]
-    free, others = (tuple(f for f in of if f.name not in replaced) for of in (model.fit.free, others))
+    free = tuple(f for f in model.fit.free if f.name not in replaced)
     own = stacked_jacobian(search.noise, free, model.fit.columns, search.train)
-    own_there = stacked_jacobian(search.noise, others, best.fit.columns, search.train)
-    left = np.concatenate([best.fit.residuals[cycle] for cycle in search.train])
-    beaten = np.sqrt(within_reach(best) * search.noise.expected(search.train)) + CURVED * np.linalg.norm(done)
     found: dict[str, Screened] = {}
+    asked: list[Screened] = []
     for s in screened:
         c = s.candidate
         if c.effect in found or c.effect == effect.effect or (c.effect in fitted and not replaced):
             continue
-        share = _share_done_by(done, columns_of(search, c), own)
+        amounts, share = _do_most(done, columns_of(search, c), own)
         if share > COLLINEAR and c.effect not in fitted and not only_there:
             found[c.effect] = s
         elif share > RESEMBLING:
-            J = _columns_at(search, best.fit.point, c)
-            if _share_done_by(done, J, own_there) > COLLINEAR:
-                limits = zip(bounds(others, rest), c.limits(), strict=True)
-                low, high = (np.concatenate(ends) for ends in limits)
-                there = np.concatenate([own_there, J], axis=1)
-                step, _ = solve_within_bounds(there, done, low, high)
-                if only_there and np.linalg.norm(left + done - there @ step) > beaten:
-                    continue
-                start = {**step_to(rest, others, step[: len(others)]), **c.start(step[len(others) :])}
-                found[c.effect] = s._replace(start=start)
+            asked.append(s._replace(start=_start_instead(search, best, done, c, amounts, replaced)))
+    for s in _keep_alike(search, best, done, asked, near=only_there and best.excess <= DISTANT):
+        found.setdefault(s.candidate.effect, s)
     return list(found.values())
+
+
+def _start_instead(
+    search: Search, best: Model, done: Array, c: Candidate, amounts: Array, replaced: Sequence[str]
+) -> Point:
+    """A start with a candidate that by first order does what the last effect of `best` has done, in its place.
+
+    Its columns are taken over steps as long as the `amounts` that do it by nominal probes.
+    """
+    others, rest = strip(best, best.effects[-1])[1:]
+    others = tuple(f for f in others if f.name not in replaced)
+    limits = zip(bounds(others, rest), c.limits(), strict=True)
+    low, high = (np.concatenate(ends) for ends in limits)
+    own = stacked_jacobian(search.noise, others, best.fit.columns, search.train)
+    there = np.concatenate([own, _columns_at(search, rest, c.sized(amounts))], axis=1)
+    step, _ = solve_within_bounds(there, done, low, high)
+    return {**step_to(rest, others, step[: len(others)]), **c.start(step[len(others) :])}
+
+
+def _keep_alike(search: Search, best: Model, done: Array, asked: Sequence[Screened], near: bool) -> list[Screened]:
+    """Those whose starts, simulated, leave hardly more than `best`: as much as first order may be off by, and the fit
+    makes good.
+
+    What is found from noisy columns says little of what they leave: of runs that are random their difference does.
+    """
+    if not asked:
+        return []
+    points = [best.fit.point, *(s.start for s in asked)]
+    left = residuals_at(search.plant, search.noise, points, search.train, N_GLANCE)
+    here, *there = [search.noise.misfit(list(at.values()), search.train) for at in left]
+    off = (CURVED**2 if near else 1.0 - COLLINEAR**2) * float(done @ done) / search.noise.expected(search.train)
+    more = off + (within_reach(best) - best.fit.misfit if near else 0.0)
+    return [s for s, misfit in zip(asked, there, strict=True) if misfit - here < more]
 
 
 def _columns_at(search: Search, point: Point, c: Candidate) -> Array:
@@ -214,9 +236,9 @@ def _columns_at(search: Search, point: Point, c: Candidate) -> Array:
     return stacked_jacobian(search.noise, names, cols, search.train)
 
 
-def _share_done_by(done: Array, columns: Array, own: Array) -> float:
-    """What share of something columns can do beside others."""
+def _do_most(done: Array, columns: Array, own: Array) -> tuple[Array, float]:
+    """With which values columns do most of something, and which share of what others beside them cannot do."""
     Q, _ = np.linalg.qr(own)
     done, columns = (x - Q @ (Q.T @ x) for x in (done, columns))
-    values = np.linalg.lstsq(columns, done, rcond=None)[0]
-    return float(np.linalg.norm(columns @ values)) / max(float(np.linalg.norm(done)), 1e-300)
+    values = np.asarray(np.linalg.lstsq(columns, done, rcond=None)[0], dtype=float)
+    return values, float(np.linalg.norm(columns @ values)) / max(float(np.linalg.norm(done)), 1e-300)

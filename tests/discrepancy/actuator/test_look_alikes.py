@@ -1,0 +1,56 @@
+"""What can do as well as the effect that was found first, where the fit is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks import strata
+from ema.core.names import FAULTS
+from ema.core.records import Cycle, Record
+from ema.discrepancy.actuator.candidates import candidates
+from ema.discrepancy.actuator.cycles import prepare
+from ema.discrepancy.actuator.examine import split
+from ema.discrepancy.actuator.free import K_FREE
+from ema.discrepancy.actuator.noise import Noise
+from ema.discrepancy.actuator.plant import EmaPlant
+from ema.discrepancy.actuator.screening import find_look_alikes, rank_to_first_order
+from ema.discrepancy.actuator.search import Search
+
+
+@pytest.mark.further
+@pytest.mark.slow
+def test_a_load_is_asked_where_a_spring_does_the_same_around_one_place(hidden):
+    """On a light actuator, where differences of runs are mostly noise: of what is the same, they show nine tenths."""
+    trial = strata.drawn("three effects", 2, 2557375145)
+    k = {name: x for name, x in zip(FAULTS, trial.k, strict=True) if x}
+    made = hidden.cycles(hidden.Flaws(**trial.values, **k), 6, 75145, trial.motions, trial.bench)
+    data = prepare(trial.actuator, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))])
+    plant = EmaPlant(trial.actuator, data, 1)
+    of = {c.effect: c for c in candidates(trial.actuator, data, [])}
+    late, inertia, spring = of["comparator_delay"], of["inertia"], of["spring_load"]
+    frees = (*K_FREE, *late.frees, *inertia.frees)
+    true = {**k, "comparator_delay.time": trial.values["reaction"], "inertia.change": trial.values["inertia"]}
+    search = Search(plant, Noise(plant, true), *split(data))
+    before = search.model((late, inertia), frees, true, None, 2)
+    best = search.model((late, inertia, spring), (*frees, *spring.frees), before.fit.point, None, 4)
+    assert best.excess < 0.1
+    assert best.fit.point["spring_load.stiffness"] * 0.0255 == pytest.approx(trial.values["load"], rel=0.1)
+    search.noise = Noise(plant, best.fit.point)
+    screened = rank_to_first_order(search, before)
+    alike = find_look_alikes(search, before, best, screened, {"spring_load"}, only_there=True)
+    assert {s.candidate.effect for s in alike} == {"constant_load", "asymmetric_friction"}
+
+
+def test_probes_are_made_as_long_as_what_they_are_to_do(shipped_plant, hidden):
+    """A second probe goes to the side, and as far, as the first one says."""
+    data = prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(hidden.cycles(hidden.Flaws(), 2))))])
+    of = {c.effect: c for c in candidates(shipped_plant, data, [])}
+    load = of["constant_load"].sized(np.array([-0.4]))
+    assert load.amounts == pytest.approx([-0.4])
+    assert load.probes() == [{"constant_load.torque": -0.4}]
+    magnet = of["magnet_flux"].sized(np.array([-0.5]))
+    assert magnet.frees == of["magnet_flux"].frees
+    assert magnet.amounts[0] < 0.0
+    low, _ = magnet.limits()
+    assert of["magnet_flux"].sized(10.0 * low).amounts == pytest.approx(low)
