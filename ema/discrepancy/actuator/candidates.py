@@ -87,10 +87,14 @@ class Candidate:
         return replace(self, steps=tuple(steps.tolist()), frees=tuple(frees))
 
     def sized(self, values: Array) -> Candidate:
-        """The same with steps as long, on average, as values of the linear parameters (less neutral), to their side."""
+        """The same with steps as long, on average, as values of the linear parameters (less neutral).
+
+        To the side of the values, where bounds leave any of it.
+        """
         low, high = self.limits()
         size = float(np.sqrt(np.mean((values / self.amounts) ** 2)))
-        steps = np.clip(np.copysign(size * self.amounts, values), low, high)
+        there, usual = (np.clip(x, low, high) for x in (np.copysign(size * self.amounts, values), size * self.amounts))
+        steps = np.where(there == 0.0, usual, there)
         neutral = np.array(self.steps) - self.amounts
         return replace(self, steps=tuple((neutral + steps).tolist()))
 

@@ -54,3 +54,4 @@ def test_probes_are_made_as_long_as_what_they_are_to_do(shipped_plant, hidden):
     assert magnet.amounts[0] < 0.0
     low, _ = magnet.limits()
     assert of["magnet_flux"].sized(10.0 * low).amounts == pytest.approx(low)
+    assert of["comparator_delay"].sized(np.array([-1e-6])).amounts == pytest.approx([1e-6])  # it is never early
