@@ -18,7 +18,7 @@ def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
 EFFECT = Effect(
     name="drive_offset",
     parameters=(Parameter("offset", "A, V or N", 0.0, -10.0, 10.0, 0.02, "constant added to the recorded drive"),),
-    sentence="the recorded drive (current, voltage or force) is offset by {offset:+.3g}",
+    sentence="the recorded drive (current, voltage or force) is offset by {offset:+.3g} A, V or N",
     separated_by="a record with the drive switched off",
     mistaken_for=("k1",),
     plants=("axis",),

@@ -26,13 +26,16 @@ SAID = {  # of those that begin alike the longest first
 
 # Of a drive whose own torque or force is recorded, what is per ampere of a current is a share.
 RECORDED = {"N m/A times the size of the current": "times the size of the {drive}", "N m/A": "1"}
+UNITS = {"current": "A", "voltage": "V", "force": "N", "torque": "N m"}
 
 
 def by_drive(text: str, drive: str) -> str:
-    """A sentence or a unit of what is in proportion to the drive: there is no current where its torque is recorded."""
+    """A sentence or a unit of what the drive is, or is in proportion to: there is one, and not always a current."""
     if drive in ("force", "torque"):
         for said, instead in RECORDED.items():
             text = text.replace(said, instead.format(drive=drive))
+    if drive in UNITS:
+        text = text.replace("drive (current, voltage or force)", drive).replace("A, V or N", UNITS[drive])
     return text
 
 

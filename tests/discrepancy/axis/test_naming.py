@@ -48,6 +48,9 @@ def test_what_is_said_of_a_linear_axis_has_no_radians(rotary, linear):
 def test_where_the_torque_itself_is_recorded_nothing_is_per_ampere():
     assert by_drive("N m/A", "torque") == "1"
     assert by_drive("N m/A", "current") == "N m/A"
+    assert by_drive("offset by +1 A, V or N of the drive (current, voltage or force)", "torque") == (
+        "offset by +1 N m of the torque"
+    )
 
 
 @pytest.mark.parametrize("name", ["constant_load", "position_friction", "spring_load", "gear_compliance"])
