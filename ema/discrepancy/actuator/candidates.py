@@ -151,6 +151,10 @@ class Line(Candidate):
         """The same with a larger amplitude."""
         return replace(self, steps=tuple(factor * x for x in self.steps))
 
+    def sized(self, values: Array) -> Candidate:
+        """The same with the amplitude that A cos φ and A sin φ have on average, inside bounds."""
+        return replace(self, steps=(min(float(np.sqrt(np.mean(values**2))), float(self.limits()[1][0])),))
+
     def probes(self) -> list[Point]:
         """Sine and cosine of the line."""
         on = {f"{self.effect}.{n}": v for n, v in self.fixed.items()} | {f"{self.effect}.amplitude": self.steps[0]}

@@ -8,7 +8,7 @@ import pytest
 from benchmarks import strata
 from ema.core.names import FAULTS
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.candidates import candidates
+from ema.discrepancy.actuator.candidates import Line, candidates
 from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import split
 from ema.discrepancy.actuator.free import K_FREE
@@ -40,6 +40,19 @@ def test_a_load_is_asked_where_a_spring_does_the_same_around_one_place(hidden):
     screened = rank_to_first_order(search, before)
     alike = find_look_alikes(search, before, best, screened, {"spring_load"}, only_there=True)
     assert {s.candidate.effect for s in alike} == {"constant_load", "asymmetric_friction"}
+
+
+def test_probes_of_any_size_are_as_many_as_their_columns(shipped_plant, hidden):
+    data = prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(hidden.cycles(hidden.Flaws(), 2))))])
+    line = Line("cogging", (), {"order": 6.0}, ("amplitude",), (0.02,))
+    assert line.sized(np.array([0.03, -0.04])).amounts == pytest.approx([0.05 / 2**0.5] * 2)
+    found = [*candidates(shipped_plant, data, []), line]
+    assert len(found) > 20
+    for c in found:
+        sized = c.sized(-0.3 * c.amounts)
+        assert len(sized.amounts) == len(sized.probes()) == len(c.amounts)
+        assert np.all(sized.amounts != 0.0)
+        assert sized.probe_name(0) == c.probe_name(0)
 
 
 def test_probes_are_made_as_long_as_what_they_are_to_do(shipped_plant, hidden):
