@@ -107,6 +107,7 @@ def _examined(
     from importlib import import_module
 
     from ema.core import config, terminal
+    from ema.core.stopping import terminated_as_interrupted
     from ema.discrepancy.extended import write_extended
     from ema.discrepancy.progress import Progress
     from ema.discrepancy.report import write_report
@@ -123,7 +124,8 @@ def _examined(
 
         progress = Progress(say)
         try:
-            findings, draw = import_module(examiner).discrepancy(plant_file, read, progress)
+            with terminated_as_interrupted():
+                findings, draw = import_module(examiner).discrepancy(plant_file, read, progress)
         except KeyboardInterrupt:
             if not progress.tried:
                 raise

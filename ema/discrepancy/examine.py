@@ -73,6 +73,8 @@ def examine(
             "held-out parts better by what matters: filtered, quantised or held channels can look like this, and so "
             "can something small that is missing"
         )
+    if left.event:
+        notes.append(left.event)
     if state.immaterial and outcome in ("adequate", "explained"):
         notes.append(f"{state.immaterial}: too little for a cause")
     # with terms that have no name, more is told than the verdict asked for

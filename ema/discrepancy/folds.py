@@ -10,6 +10,9 @@ import numpy as np
 
 from ema.core.records import Array
 
+ALONE = 10.0  # deviations that other parts have among themselves, by which a part stands out
+TWICE = 2.0  # times the noise that it leaves at least
+
 
 @dataclass(frozen=True)
 class Folds:
@@ -66,6 +69,19 @@ class Folds:
         """Standard error of `rest`."""
         after, floor = np.array(self.after), np.array(self.floor)
         return self._jackknife(lambda w: _rms(after, w) / max(_rms(floor, w), 1e-300))
+
+    @property
+    def event(self) -> tuple[str, float, float] | None:
+        """The one part that leaves far more than all others, with what it and the most of these leave; else None.
+
+        What happens once makes a mean over parts scatter, and so looks like chance.
+        """
+        rests = np.sqrt(np.array(self.after) / np.maximum(self.floor, 1e-300))
+        k = int(np.argmax(rests))
+        others = np.delete(rests, k)
+        if len(others) < 3 or rests[k] < max(TWICE, others.mean() + ALONE * others.std(ddof=1)):
+            return None
+        return self.names[k], float(rests[k]), float(others.max())
 
     @property
     def told_rest(self) -> str:

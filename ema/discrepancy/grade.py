@@ -15,7 +15,7 @@ not noise                  error and residual within `LIMIT`                  ad
 not noise                  error within; residual beyond, no more than the    unexplained     /  explained, note
                            form of the laws that are named may leave
 not noise                  error beyond by no more than parts scatter,        adequate, note  /  partly explained
-                           residual within
+                           residual within, no part far beyond all others
 not noise                  anything else                                      unexplained     /  partly explained
 =========================  =================================================  ==================================
 """
@@ -68,11 +68,23 @@ class Left:
     def is_sure(self) -> bool:
         """Whether more is left than noise makes: of the residual, or of the error by more than its parts scatter.
 
-        The residual is weighed by its noise, so that each part counts for what it can tell. The error in the plant's
-        own unit is not: of free runs one part may make most of it.
+        The residual is weighed by its noise, so that each part counts for what it can tell, and one alone that leaves
+        far more than all others is sure. The error in the plant's own unit is not: of free runs one part may make most
+        of it.
         """
         error = self.error.rest - UPPER * self.error.rest_error if len(self.error.names) > 1 else self.error.rest
-        return self.residual.rest > self.allowed or error > self.allowed
+        return self.residual.rest > self.allowed or error > self.allowed or self.residual.event is not None
+
+    @property
+    def event(self) -> str:
+        """What happened once, in words; empty where nothing did."""
+        if self.is_chance or self.residual.event is None:
+            return ""
+        name, rest, others = self.residual.event
+        return (
+            f"{name} leaves {rest:.3g} times the noise, every other part at most {others:.3g}: something happened "
+            "there that is not in the rest of the record (a slip, a blow, a disturbed signal)"
+        )
 
     @property
     def sentence(self) -> str:

@@ -83,8 +83,15 @@ def _parts(plant: Plant) -> list[tuple[str, str, set[int]]]:
                 of.setdefault(block.stretch, []).append(j)
         stretches = list(of.values())
         for k, some in enumerate(np.array_split(np.arange(len(stretches)), min(n_each, len(stretches)))):
-            parts.append((f"{group}, part {k + 1}", group, {j for s in some for j in stretches[s]}))
+            blocks = {j for s in some for j in stretches[s]}
+            parts.append((f"{group}, part {k + 1}{_told_when(plant, blocks)}", group, blocks))
     return parts
+
+
+def _told_when(plant: Plant, blocks: set[int]) -> str:
+    """From when to when blocks last, in words; empty where they have no time."""
+    times = [when for j in blocks if (when := plant.blocks[j].when) is not None]
+    return f" ({min(a for a, _ in times):.3g} to {max(b for _, b in times):.3g} s)" if times else ""
 
 
 def _of_part(plant: Plant, plain: Tried, model: Tried, blocks: set[int]) -> tuple[float, float, float, float]:

@@ -64,11 +64,12 @@ class Block:
     """An independent part of the records.
 
     `group` says from which record it is; blocks of one `stretch` of a group lie so close together that one must not
-    be used to check what was fitted on another.
+    be used to check what was fitted on another. `when` is its time in the record, where that has one course. [s]
     """
 
     group: str
     stretch: int = 0
+    when: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

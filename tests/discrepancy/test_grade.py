@@ -76,6 +76,18 @@ def test_one_part_that_runs_away_raises_no_alarm_where_the_residual_is_noise_and
     assert grade(Left(False, folds(*[1.7] * 9, 1.9), folds(1.1, 1.1)), named=False) == "unexplained"
 
 
+def test_what_happens_once_is_no_chance_and_is_told_with_its_part():
+    """A coupling that slipped once left 3.08 floors of the residual in one part of 17, and 1.24 ± 0.25 in the mean."""
+    usual = (0.98, 0.95, 1.02, 1.01, 0.97, 0.99, 1.0, 0.96, 1.02)
+    slipped = Left(False, folds(*[1.0] * 9, 16.0), folds(*usual, 3.08), noise_uncertainty=0.1)
+    assert slipped.residual.rest < slipped.allowed
+    assert grade(slipped, named=False) == "unexplained"
+    assert "cycle 9 leaves 3.08 times the noise, every other part at most 1.02" in slipped.event
+    assert grade(Left(True, folds(*[1.0] * 10), folds(*usual, 3.08)), named=False) == "adequate"
+    for parts in ((*usual, 1.5), (*usual[:8], 2.1, 2.2), (0.9, 1.3, 1.7, 2.1), (1.0, 3.0)):
+        assert Left(False, folds(*parts), folds(*parts)).event == ""
+
+
 def test_one_lucky_part_does_not_make_it_explained():
     """The part that a single split would have held out is at noise; the others are not."""
     unlucky = folds(1.0, 1.5, 1.5, 1.5, 1.5, 1.5)

@@ -1,4 +1,4 @@
-"""Ctrl-C writes what is known, marked as unfinished, in a real process."""
+"""Ctrl-C, or SIGTERM, writes what is known, marked as unfinished, in a real process."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ def bench(tmp_path_factory, support):
     return folder
 
 
-def interrupted_at(bench, out, text, times=1):
-    """The exit status and standard output of a run that gets SIGINT when a line of its progress has `text`."""
+def interrupted_at(bench, out, text, times=1, by=signal.SIGINT):
+    """The exit status and standard output of a run that gets a signal when a line of its progress has `text`."""
     words = [EMA, "discrepancy", "--plant", bench / "plant.yaml", bench / "record.csv", "--out", out]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     seen = 0
     for line in process.stderr:
         seen += text in line
         if seen == times:
-            process.send_signal(signal.SIGINT)
+            process.send_signal(by)
             break
     said, errors = process.communicate(timeout=120)
     assert seen == times, "the run ended before the moment"
@@ -43,9 +43,9 @@ def interrupted_at(bench, out, text, times=1):
     return process.returncode, said
 
 
-@pytest.mark.parametrize("times", [1, 5])
-def test_what_leads_is_written_and_marked(bench, tmp_path, times):
-    status, said = interrupted_at(bench, tmp_path / "out", "of held-out parts", times)
+@pytest.mark.parametrize(("times", "by"), [(1, signal.SIGINT), (5, signal.SIGINT), (3, signal.SIGTERM)])
+def test_what_leads_is_written_and_marked(bench, tmp_path, times, by):
+    status, said = interrupted_at(bench, tmp_path / "out", "of held-out parts", times, by)
     assert status == 130
     found = json.loads((tmp_path / "out" / "findings.json").read_text())
     assert found["unfinished"] is True

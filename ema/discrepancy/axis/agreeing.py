@@ -41,8 +41,8 @@ def merge(
         own = [k for k, e in enumerate(out) if e.name == name and _is_same(e, effects(b, term)[name])]
         for k in own:
             out[k] = _with_pairs(out[k], b, term)
-            if out[k].indistinguishable_from:
-                continue
+            if out[k].indistinguishable_from or verdict == "partly explained":
+                continue  # what it leaves unexplained it may have been taken for, however often it wins
             out[k] = replace(out[k], confidence=max(out[k].confidence, round(b.confidence(term), 4)))
     if b is None or verdict in ("adequate", "explained") or not find_missing(b, out):
         return out, None

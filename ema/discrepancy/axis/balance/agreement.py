@@ -25,6 +25,7 @@ from .rows import Rows
 
 INEXACT = 0.1  # of a coefficient, that another motion may move it by, since no law has quite the right form
 RARE = 0.01  # p below which records do not agree, over all that is asked
+USUAL = 0.05  # p from which nothing speaks against one value, whatever else each record foretells better
 SHOWN = 0.01  # p below which one record shows a law
 UNSEEN = 1e3  # of a coefficient, by which it may be off in a record in which nothing shows it
 
@@ -74,7 +75,7 @@ class Agreement:
 
     def is_one(self, n_asked: int) -> bool:
         """Whether the records agree, where so many questions are asked."""
-        return not self.needed and self.p_inexact >= RARE / max(n_asked, 1)
+        return self.p >= USUAL or (not self.needed and self.p_inexact >= RARE / max(n_asked, 1))
 
 
 def agreements(found: Rows, plain: Plain, model: Regression) -> list[Agreement]:

@@ -11,7 +11,7 @@ from ema.discrepancy.axis.interval import interval
 from ema.discrepancy.axis.linear import in_metres
 from ema.discrepancy.findings import WITHIN
 
-from .agreement import Agreement
+from .agreement import USUAL, Agreement
 from .found import N_DRAWS
 from .law import BY_RECORD, Law
 
@@ -78,7 +78,7 @@ def _sentence(a: Agreement, entry: dict[str, Any]) -> str:
     test = f"χ² = {a.chi2:.3g} of {a.dof}, p = {a.p:.1g}"
     missing = [name for name in entry["records"] if name not in entry["shown_by"]]
     if entry["agree"]:
-        text = f"{said}: the records agree ({test})" if a.p >= 0.05 else f"{said}: nearly the same, {each} ({test})"
+        text = f"{said}: the records agree ({test})" if a.p >= USUAL else f"{said}: nearly the same, {each} ({test})"
         if len(entry["shown_by"]) == 1:
             blind = [name for name in missing if name not in entry["could_be_shown_by"]]
             text = f"{said}: seen in {entry['shown_by'][0]} only" + (
