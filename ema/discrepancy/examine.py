@@ -73,10 +73,11 @@ def examine(
             "held-out parts better by what matters: filtered, quantised or held channels can look like this, and so "
             "can something small that is missing"
         )
-    if left.event:
-        notes.append(left.event)
     if state.immaterial and outcome in ("adequate", "explained"):
         notes.append(f"{state.immaterial}: too little for a cause")
+    structure = plant.describe_structure(terms, final.point) if terms or outcome == "unexplained" else {}
+    if left.event:
+        structure = {**structure, "event": left.event}
     # with terms that have no name, more is told than the verdict asked for
     is_chance = judge_model(plant, state.model).is_noise if terms else left.is_chance
     names = [f.name for f in plant.base]
@@ -85,7 +86,7 @@ def examine(
         because=verdict.because,
         p_value=verdict.p_value,
         effects=describe_effects(plant, state, trust, weighed, final.point, draw),
-        structure=plant.describe_structure(terms, final.point) if terms or outcome == "unexplained" else {},
+        structure=structure,
         train=training_errors(plant, plain, state.model),
         folds=over_folds(plant, plain, state.model) if terms else left.error,
         left=left,

@@ -98,10 +98,10 @@ class AxisPlant:
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
         """The windows."""
-        labels: dict[str, set[str]] = {}
+        cycles: dict[str, set[int]] = {}
         for w in self.windows:
-            labels.setdefault(w.group, set()).add(w.label)
-        when = [(float(w.t[0]), float(w.t[-1])) if len(labels[w.group]) == 1 else None for w in self.windows]
+            cycles.setdefault(w.group, set()).add(w.cycle)
+        when = [(float(w.t[0]), float(w.t[-1])) if len(cycles[w.group]) == 1 else None for w in self.windows]
         return tuple(Block(w.group, w.stretch, of) for w, of in zip(self.windows, when, strict=True))
 
     @property

@@ -29,6 +29,7 @@ AT_REST = 3.0  # noise amplitudes of the smoothed speed below which nothing is s
 SHORTEST_REST = 3  # samples
 START_NOISE = 1.5 / np.sqrt(2 * HALF + 1)  # of a smoothed start state, per noise of one sample
 STRETCH = 0.4  # [s] windows closer together are not independent enough to check one another
+PER_CYCLE = 1_000_000  # stretches and parts that a cycle may have
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,11 @@ class Window:
     part: Part = NO_PART
     first: int = 0
     earliest: int = 0
+
+    @property
+    def cycle(self) -> int:
+        """Number of the cycle it is from."""
+        return self.stretch // PER_CYCLE
 
     @property
     def n(self) -> int:
@@ -191,7 +197,7 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
     n_window = max(MIN_WINDOW, round(length / dt))
     out = []
     load = known_load(cycle, who.load)
-    number = cycle.number * 1_000_000  # stretches and parts of different cycles are different
+    number = cycle.number * PER_CYCLE  # stretches and parts of different cycles are different
     starts = np.array([0, *gaps])
     started = _start_states(cycle, who, noise, gaps, (smooth, speed))
     pieces = zip(*(np.split(x, gaps) for x in (t, cycle[who.drive], load, raw, *started)), strict=True)
@@ -316,7 +322,7 @@ def _static(group: str, cycle: Cycle, who: Roles) -> list[Window]:
         i = cycle[who.drive][rows]
         label = f"{group}, {cycle}, {theta[rows][0]:.3g} rad"
         columns = (t[rows], i, known_load(cycle, who.load)[rows], i[None, :], theta[rows], np.zeros(len(i)))
-        out.append(Window(group, label, *columns, 0.0, True, direction[rows], cycle.number * 1_000_000 + k))
+        out.append(Window(group, label, *columns, 0.0, True, direction[rows], cycle.number * PER_CYCLE + k))
     return out
 
 

@@ -68,7 +68,8 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     )
     structure = dict(outcome.structure)
     if structure:
-        structure["sentences"] = [term["sentence"] for term in structure["terms"]]
+        structure["sentences"] = [term["sentence"] for term in structure.get("terms", ())]
+        structure["sentences"] += [structure["event"]] if "event" in structure else []
     notes = [*outcome.notes]
     if outcome.verdict != "adequate":
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
