@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 from ema.core import resources
 from ema.core.records import Record
+from ema.discrepancy.axis import stamps
 from ema.discrepancy.records import begin
 
 
 def axis_file(records: Sequence[Record], sheet: begin.Sheet, name: str) -> str:
     """Of an axis; RecordError where the records hold no motion or no drive."""
     known = begin.begin_axis(records, sheet)
-    lines = _head(records)
-    lines += [f"name: {name}"]
+    lines = [*_head(records), *_stamps(records), f"name: {name}"]
     for one in known:
         line = f"{one.key}: {one.value}"
         lines.append(f"{line:<32} # {one.origin}" if one.origin else line)
@@ -45,6 +45,15 @@ def actuator_file(records: Sequence[Record], sheet: begin.Sheet, name: str) -> s
         "# What carries no other remark is the shipped actuator's: a guess for yours, to be replaced by its data sheet."
     )
     return "\n".join([*_head(records), guess, "", *text.splitlines()[1:], ""])
+
+
+def _stamps(records: Sequence[Record]) -> list[str]:
+    """What is the matter with the times of the samples, which makes inertia and friction another."""
+    said = []
+    for record in records:
+        motion = next((name for name in ("theta_m", "q", "w_m", "v") if name in record.channels), None)
+        said += stamps.describe(record.name, record.cycles, motion) if motion else []
+    return [f"# {text}; what is fitted below may be off" for text in said]
 
 
 def _head(records: Sequence[Record]) -> list[str]:

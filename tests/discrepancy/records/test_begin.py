@@ -35,6 +35,20 @@ def test_an_axis_gets_its_inertia_and_friction_from_the_record(tmp_path):
     assert "data sheet" in text
 
 
+def test_stamps_that_jitter_are_said_in_the_file_that_they_spoil(tmp_path):
+    """Stamps off by a seventh of the period had an inertia of 6e-4 fitted as 4.4e-4."""
+    record = bench()
+    rng = np.random.default_rng(3)
+    late = [c["t"] + 0.15 / RATE * rng.standard_normal(c.n_samples) for c in record]
+    shaken = Record(tuple(Cycle(c.number, {**c.channels, "t": t}) for c, t in zip(record, late, strict=True)))
+    assert "time stamps jitter" not in init(record, tmp_path, "--k-t", str(K_T)).read_text()
+    (tmp_path / "shaken").mkdir()
+    text = init(shaken, tmp_path / "shaken", "--k-t", str(K_T)).read_text()
+    (line,) = [line for line in text.splitlines() if "time stamps jitter" in line]
+    assert line.startswith("#")
+    assert "give them even times" in line
+
+
 def test_what_nobody_said_is_marked_as_a_guess(tmp_path):
     text = init(bench(), tmp_path).read_text()
     (line,) = [line for line in text.splitlines() if line.startswith("k_t")]
