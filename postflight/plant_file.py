@@ -51,8 +51,8 @@ def _stamps(records: Sequence[Record]) -> list[str]:
     """What is the matter with the times of the samples, which makes inertia and friction another."""
     said = []
     for record in records:
-        motion = next((name for name in ("theta_m", "q", "w_m", "v") if name in record.channels), None)
-        said += stamps.describe(record.name, record.cycles, motion) if motion else []
+        motion = next(name for name in begin.motion_channels(record.channels) if name in record.channels)
+        said += stamps.describe(record.name, record.cycles, motion)
     return [f"# {text}; what is fitted below may be off" for text in said]
 
 

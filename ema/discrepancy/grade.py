@@ -15,8 +15,9 @@ not noise                  error and residual within `LIMIT`                  ad
 not noise                  error within; residual beyond, no more than the    unexplained     /  explained, note
                            form of the laws that are named may leave
 not noise                  error beyond by no more than parts scatter,        adequate, note  /  partly explained
-                           residual within, no part far beyond all others
-not noise                  anything else                                      unexplained     /  partly explained
+                           residual within
+not noise                  anything else, and whatever else where one part    unexplained     /  partly explained
+                           stands alone far beyond all others (`event`)
 =========================  =================================================  ==================================
 """
 
@@ -100,5 +101,5 @@ def grade(left: Left, *, named: bool) -> Verdict:
     """The verdict on what `left` says, with causes `named` or without any."""
     if not named:
         return "adequate" if left.is_chance or not left.is_sure else "unexplained"
-    is_little = left.is_chance or left.is_form or left.residual.rest <= left.allowed
+    is_little = left.is_chance or (not left.event and (left.is_form or left.residual.rest <= left.allowed))
     return "explained" if is_little and left.error.rest <= LIMIT else "partly explained"

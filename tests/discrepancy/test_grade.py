@@ -84,6 +84,7 @@ def test_what_happens_once_is_no_chance_and_is_told_with_its_part():
     assert grade(slipped, named=False) == "unexplained"
     assert "cycle 9 leaves 3.08 times the noise, every other part at most 1.02" in slipped.event
     assert grade(Left(True, folds(*[1.0] * 10), folds(*usual, 3.08)), named=False) == "adequate"
+    assert grade(Left(False, folds(*[1.0] * 10), folds(*usual, 3.08)), named=True) == "partly explained"
     for parts in ((*usual, 1.5), (*usual[:8], 2.1, 2.2), (0.9, 1.3, 1.7, 2.1), (1.0, 3.0)):
         assert Left(False, folds(*parts), folds(*parts)).event == ""
 

@@ -81,22 +81,21 @@ class Candidate:
 
     def wider(self, factor: float) -> Candidate:
         """The same with longer steps, inside bounds."""
-        low, high = self.limits()
-        steps = np.array(self.steps) + np.clip(factor * self.amounts, low, high) - self.amounts
         frees = [replace(f, step=factor * f.step) if f.name.split(".")[1] in self.linear else f for f in self.frees]
-        return replace(self, steps=tuple(steps.tolist()), frees=tuple(frees))
+        return replace(self._with_amounts(np.clip(factor * self.amounts, *self.limits())), frees=tuple(frees))
 
     def sized(self, values: Array) -> Candidate:
         """The same with steps as long, on average, as values of the linear parameters (less neutral).
 
         To the side of the values, where bounds leave any of it.
         """
-        low, high = self.limits()
-        size = float(np.sqrt(np.mean((values / self.amounts) ** 2)))
-        there, usual = (np.clip(x, low, high) for x in (np.copysign(size * self.amounts, values), size * self.amounts))
-        steps = np.where(there == 0.0, usual, there)
+        usual = np.sqrt(np.mean((values / self.amounts) ** 2)) * self.amounts
+        there, back = (np.clip(x, *self.limits()) for x in (np.copysign(usual, values), usual))
+        return self._with_amounts(np.where(there == 0.0, back, there))
+
+    def _with_amounts(self, amounts: Array) -> Candidate:
         neutral = np.array(self.steps) - self.amounts
-        return replace(self, steps=tuple((neutral + steps).tolist()))
+        return replace(self, steps=tuple((neutral + amounts).tolist()))
 
     def limits(self) -> tuple[Array, Array]:
         """Bounds of the linear parameters, less neutral."""

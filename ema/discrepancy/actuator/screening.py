@@ -174,7 +174,7 @@ def find_look_alikes(
     free = tuple(f for f in model.fit.free if f.name not in replaced)
     own = stacked_jacobian(search.noise, free, model.fit.columns, search.train)
     found: dict[str, Screened] = {}
-    asked: list[Screened] = []
+    asked: list[tuple[Screened, Array]] = []
     for s in screened:
         c = s.candidate
         if c.effect in found or c.effect == effect.effect or (c.effect in fitted and not replaced):
@@ -183,43 +183,46 @@ def find_look_alikes(
         if share > COLLINEAR and c.effect not in fitted and not only_there:
             found[c.effect] = s
         elif share > RESEMBLING:
-            asked.append(s._replace(start=_start_instead(search, best, done, c, amounts, replaced)))
-    for s in _keep_alike(search, best, done, asked, near=only_there and best.excess <= DISTANT):
+            asked.append((s, amounts))
+    begun = _start_instead(search, best, done, asked, replaced)
+    for s in _keep_alike(search, best, done, begun, near=only_there and best.excess <= DISTANT):
         found.setdefault(s.candidate.effect, s)
     return list(found.values())
 
 
 def _start_instead(
-    search: Search, best: Model, done: Array, c: Candidate, amounts: Array, replaced: Sequence[str]
-) -> Point:
-    """A start with a candidate that by first order does what the last effect of `best` has done, in its place.
+    search: Search, best: Model, done: Array, asked: Sequence[tuple[Screened, Array]], replaced: Sequence[str]
+) -> list[Screened]:
+    """Candidates that begin with what by first order does what the last effect of `best` has done, in its place.
 
-    Its columns are taken over steps as long as the `amounts` that do it by nominal probes.
+    Columns of each are taken over steps as long as the values, given with it, that do it by nominal probes.
     """
     others, rest = strip(best, best.effects[-1])[1:]
     others = tuple(f for f in others if f.name not in replaced)
-    limits = zip(bounds(others, rest), c.limits(), strict=True)
-    low, high = (np.concatenate(ends) for ends in limits)
-    own = stacked_jacobian(search.noise, others, best.fit.columns, search.train)
-    there = np.concatenate([own, _columns_at(search, rest, c.sized(amounts))], axis=1)
-    step, _ = solve_within_bounds(there, done, low, high)
-    return {**step_to(rest, others, step[: len(others)]), **c.start(step[len(others) :])}
+    own, limits = stacked_jacobian(search.noise, others, best.fit.columns, search.train), bounds(others, rest)
+    begun = []
+    for s, values in asked:
+        c = s.candidate
+        low, high = (np.concatenate(ends) for ends in zip(limits, c.limits(), strict=True))
+        there = np.concatenate([own, _columns_at(search, rest, c.sized(values))], axis=1)
+        step, _ = solve_within_bounds(there, done, low, high)
+        begun.append(s._replace(start={**step_to(rest, others, step[: len(others)]), **c.start(step[len(others) :])}))
+    return begun
 
 
-def _keep_alike(search: Search, best: Model, done: Array, asked: Sequence[Screened], near: bool) -> list[Screened]:
-    """Those whose starts, simulated, leave hardly more than `best`: as much as first order may be off by, and the fit
-    makes good.
+def _keep_alike(search: Search, best: Model, done: Array, begun: Sequence[Screened], near: bool) -> list[Screened]:
+    """Those whose starts, simulated, leave hardly more than `best`: no more than first order may be off by.
 
     What is found from noisy columns says little of what they leave: of runs that are random their difference does.
     """
-    if not asked:
+    if not begun:
         return []
-    points = [best.fit.point, *(s.start for s in asked)]
+    points = [best.fit.point, *(s.start for s in begun)]
     left = residuals_at(search.plant, search.noise, points, search.train, N_GLANCE)
     here, *there = [search.noise.misfit(list(at.values()), search.train) for at in left]
     off = (CURVED**2 if near else 1.0 - COLLINEAR**2) * float(done @ done) / search.noise.expected(search.train)
     more = off + (within_reach(best) - best.fit.misfit if near else 0.0)
-    return [s for s, misfit in zip(asked, there, strict=True) if misfit - here < more]
+    return [s for s, misfit in zip(begun, there, strict=True) if misfit - here < more]
 
 
 def _columns_at(search: Search, point: Point, c: Candidate) -> Array:

@@ -5,7 +5,7 @@ What acts is k_t i_q, a measured torque or force, or k_t (u - k_e ω) / R by a v
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,12 +64,18 @@ class Sheet:
         return 1.0 / self.gear if self.gear is not None and self.measured_at != "load" else 1.0
 
 
+def motion_channels(have: Collection[str]) -> tuple[str, str]:
+    """Position and speed of the axis that these channels are of: a linear one where there is nothing that turns."""
+    turns, slides = ("theta_m", "w_m"), ("q", "v")
+    return slides if not any(x in have for x in turns) and any(x in have for x in slides) else turns
+
+
 def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
     """Parameters of an axis from its records; RecordError where they hold no motion or no drive."""
     have = set.intersection(*(set(record.channels) for record in records))
     there = ", ".join(sorted(have))
-    linear = not have & {"theta_m", "w_m"} and bool(have & {"q", "v"})
-    position, speed = ("q", "v") if linear else ("theta_m", "w_m")
+    position, speed = motion_channels(have)
+    linear = position == "q"
     if not have & {position, speed}:
         raise RecordError(f"{records[0].name}: no motion: theta_m, w_m, q or v is wanted (has {there})")
     measured = "force" if linear else "torque"

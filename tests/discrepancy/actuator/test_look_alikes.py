@@ -42,11 +42,17 @@ def test_a_load_is_asked_where_a_spring_does_the_same_around_one_place(hidden):
     assert {s.candidate.effect for s in alike} == {"constant_load", "asymmetric_friction"}
 
 
-def test_probes_of_any_size_are_as_many_as_their_columns(shipped_plant, hidden):
+@pytest.fixture(scope="module")
+def everything(shipped_plant, hidden):
+    """Each effect as a candidate, by name."""
     data = prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(hidden.cycles(hidden.Flaws(), 2))))])
+    return {c.effect: c for c in candidates(shipped_plant, data, [])}
+
+
+def test_probes_of_any_size_are_as_many_as_their_columns(everything):
     line = Line("cogging", (), {"order": 6.0}, ("amplitude",), (0.02,))
     assert line.sized(np.array([0.03, -0.04])).amounts == pytest.approx([0.05 / 2**0.5] * 2)
-    found = [*candidates(shipped_plant, data, []), line]
+    found = [*everything.values(), line]
     assert len(found) > 20
     for c in found:
         sized = c.sized(-0.3 * c.amounts)
@@ -55,10 +61,9 @@ def test_probes_of_any_size_are_as_many_as_their_columns(shipped_plant, hidden):
         assert sized.probe_name(0) == c.probe_name(0)
 
 
-def test_probes_are_made_as_long_as_what_they_are_to_do(shipped_plant, hidden):
+def test_probes_are_made_as_long_as_what_they_are_to_do(everything):
     """A second probe goes to the side, and as far, as the first one says."""
-    data = prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(hidden.cycles(hidden.Flaws(), 2))))])
-    of = {c.effect: c for c in candidates(shipped_plant, data, [])}
+    of = everything
     load = of["constant_load"].sized(np.array([-0.4]))
     assert load.amounts == pytest.approx([-0.4])
     assert load.probes() == [{"constant_load.torque": -0.4}]
