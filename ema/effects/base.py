@@ -118,6 +118,8 @@ class Effect:
         Where a search looks for it on an axis, if it need not be seen in the balance of torque first.
     acts_at_rest : bool
         Whether it says what friction does before it slides, so that a simulation with it knows an axis that creeps.
+    derived : mapping of str to function values → number
+        What the sentence tells besides the parameters.
     """
 
     name: str
@@ -134,6 +136,7 @@ class Effect:
     looks: tuple[Look, ...] = ()
     on_axis: OnAxis | None = None
     acts_at_rest: bool = False
+    derived: Mapping[str, Callable[[Mapping[str, float]], float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         unknown = set(self.laws) - set(HOOKS)
@@ -166,7 +169,7 @@ class Effect:
         neutral = self.neutral()
         full = {**neutral, **values}
         besides = [text for name, text in self.besides.items() if full[name] != neutral[name]]
-        told: dict[str, float | str] = {**full}
+        told: dict[str, float | str] = {**full, **{name: of(full) for name, of in self.derived.items()}}
         if self.multiplies_friction:
             name = self.parameters[0].name
             told[name] = f"{100.0 * full[name]:.3g}%" if friction is None else f"{full[name] * friction:.3g} N m"

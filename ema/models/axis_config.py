@@ -18,7 +18,7 @@ from ema.effects.torque_term import COLUMNS
 from .gear_orders import gear_orders
 
 INSTANCE = "#"  # cogging#2 is a second cogging line
-LINES = ("cogging", "gear_error", "external_torque")  # effects of which there may be several
+LINES = ("cogging", "gear_error", "external_torque", "position_line")  # effects of which there may be several
 
 
 def _noise(value: Any, info: ValidationInfo) -> Any:

@@ -31,10 +31,11 @@ class Table:
     counts: float = 2e-6  # [m]
     ripple: float = 0.1  # [N] rms of the recorded force
     hz: int = 1000
+    magnets: tuple[tuple[float, float, float], ...] = ()  # force [N], period [m] and phase, the linear motor's own
 
 
 @njit(cache=True)
-def _table(reference, hz, M, F_d, Cp, Cn, constant, quadratic, spring, stribeck, counts, noise, out):
+def _table(reference, hz, M, F_d, Cp, Cn, constant, quadratic, spring, stribeck, counts, noise, magnets, out):
     q, v, fine = 0.0, 0.0, 40
     dt = 1.0 / (hz * fine)
     for k in range(len(reference)):
@@ -45,6 +46,8 @@ def _table(reference, hz, M, F_d, Cp, Cn, constant, quadratic, spring, stribeck,
         out[0, k], out[1, k] = seen, force
         for _ in range(fine):
             drag = (Cp if v > 0 else Cn) * v + quadratic * v * abs(v) + constant + spring * q
+            for m in range(len(magnets)):
+                drag += magnets[m, 0] * np.cos(2.0 * np.pi * q / magnets[m, 1] + magnets[m, 2])
             free = v + dt / M * (force - drag)
             stop = dt / M * (F_d + stribeck * np.exp(-abs(v) / 0.02))
             before = v
@@ -72,7 +75,8 @@ def table(bench: Table, seed: int, *, seconds: float = 16.0) -> Record:
     noise = bench.ripple * rng.standard_normal(n)
     _table(
         reference, bench.hz, bench.M, bench.F_d, bench.C_positive, bench.C_negative, bench.constant, bench.quadratic,
-        bench.spring, bench.stribeck, bench.counts, noise, out,
+        bench.spring, bench.stribeck, bench.counts, noise,
+        np.array(bench.magnets).reshape(-1, 3), out,
     )  # fmt: skip
     force = out[1] + bench.ripple * rng.standard_normal(n)
     return Record((Cycle(0, {"t": t, "q": out[0], "force": force, "q_ref": reference}),))

@@ -36,7 +36,9 @@ def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Se
             if effect.name == "cogging" and values["amplitude"] < MIN_LINE * strongest:
                 continue
             said = _said(plant)
-            unit = {p.name: said(p.unit) for p in effect.parameters}
+            unit = {
+                p.name: p.unit if p.name == "phase" else said(p.unit) for p in effect.parameters
+            }  # no angle of the axis
             parameters = {}
             for name, value in values.items():
                 spread = [s.effects[key][name] for s in samples if key in s.effects]

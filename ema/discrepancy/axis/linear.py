@@ -18,6 +18,7 @@ SAID = {  # of those that begin alike the longest first
     "N m/A": "N/A",
     "1/rad": "1/m",
     "rad/s": "m/s",
+    "rad/m": "rad/m",  # of an angle that is none of the axis
     "N m": "N",
     "rad": "m",
     "θ_u": "q",

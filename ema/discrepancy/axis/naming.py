@@ -4,7 +4,8 @@
 ``F_d``, ``J``, ``k_t`` …   a parameter of the plant file
 ``stribeck.speed``          a parameter of a library effect
 ``cogging:72.cos``          cosine (sine) part of the cogging line of 72 periods per turn
-``gear_error:14.17.cos``    the same of a gear's line, or of an external torque
+``gear_error:14.17.cos``    the same of a gear's line, of an external torque, or of a line along a travel
+``position_line:262.order`` its own order, where that is fitted too
 ``term1.coefficient``       a column of an unnamed term (`ema.effects.torque_term`)
 ``zero:NAME``               angle to be added to the positions of record NAME
 ==========================  ===============================================================
@@ -63,7 +64,7 @@ def numbers_of(point: Point) -> Numbers:
     for (effect, order), parts in sorted(lines.items()):
         number = 1 + sum(key.split(INSTANCE)[0] == effect for key in effects)
         key = effect if number == 1 else f"{effect}{INSTANCE}{number}"
-        effects[key] = torque_line(order, parts.get("cos", 0.0), parts.get("sin", 0.0))
+        effects[key] = torque_line(parts.get("order", order), parts.get("cos", 0.0), parts.get("sin", 0.0))
     return Numbers(parameters, effects, list(terms.values()), zeros)
 
 

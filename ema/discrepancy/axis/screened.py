@@ -14,17 +14,20 @@ import numpy as np
 
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
+from ema.effects.position_line import EFFECT as POSITION_LINE
 from ema.models.axis_config import LINES, Axis
 
 from .balance.as_effects import effects, errors, find_alternatives, line_point
 from .balance.found import Balance
 from .candidates import PRIOR
+from .naming import line
 
 SCREENED = (
     *("viscous_by_direction", "pendulum", "output_load_friction", "drive_unequal", "viscous_slope", "friction_slope"),
     *(
         "stiffening_spring",
         "gear_error",
+        "position_line",
         "quadratic_load_friction",
         "quadratic_output_load_friction",
     ),
@@ -48,7 +51,7 @@ def suggest_by_balance(balance: Balance | None, plant: Axis, point: Point) -> li
         for name, values in (find_alternatives(balance, term) | effects(balance, term)).items():
             if name not in SCREENED:
                 continue
-            law = begin_at(name, values, unsure.get(name, {}))
+            law = begin_at(name, values, unsure.get(name, {}), balance.travel)
             if not ({f.name for f in law.free} & point.keys() if name in LINES else name in have):
                 out.append(law)
     return out
@@ -67,7 +70,7 @@ def begin_with_balance(balance: Balance | None, library: Mapping[str, Candidate]
         for name, values in effects(balance, term).items():
             if name in LINES:
                 continue
-            law = begin_at(name, values, unsure.get(name, {}))
+            law = begin_at(name, values, unsure.get(name, {}), balance.travel)
             own = library.get(law.key)
             if own is not None:
                 known = {f"{name}.{p}": value for p, value in values.items()}
@@ -77,15 +80,21 @@ def begin_with_balance(balance: Balance | None, library: Mapping[str, Candidate]
     return [*out.values()]
 
 
-def begin_at(name: str, values: dict[str, float], unsure: dict[str, float]) -> Candidate:
+def begin_at(name: str, values: dict[str, float], unsure: dict[str, float], travel: float) -> Candidate:
     """An effect that is fitted from where the balance has it, with the room of its values and of their errors."""
-    return _line(name, values) if name in LINES else _candidate(name, values, unsure)
+    return _line(name, values, travel) if name in LINES else _candidate(name, values, unsure)
 
 
-def _line(name: str, values: dict[str, float]) -> Candidate:
-    start, A = line_point(name, values), values["amplitude"]
-    free = tuple(Free(key, "N m", -ROOM * A, ROOM * A, value, 0.1 * A, 1e-3 * A) for key, value in start.items())
-    return Candidate(f"{name}:{values['order']:.5g}", name, free, (start,))
+def _line(name: str, values: dict[str, float], travel: float) -> Candidate:
+    """Of a turn the order is a whole number, or the gear's; along a `travel` it is fitted, up to a period more or less."""
+    start, A, order = line_point(name, values), values["amplitude"], values["order"]
+    free = [Free(key, "N m", -ROOM * A, ROOM * A, value, 0.1 * A, 1e-3 * A) for key, value in start.items()]
+    if name == POSITION_LINE.name:
+        period = 2.0 * np.pi / travel
+        key = line(order, "order", name)
+        free.append(Free(key, "rad/m", order - period, order + period, order, 0.1 * period, 1e-3 * period))
+        start = {**start, key: order}
+    return Candidate(f"{name}:{order:.5g}", name, tuple(free), (start,))
 
 
 def _candidate(name: str, values: dict[str, float], unsure: dict[str, float]) -> Candidate:

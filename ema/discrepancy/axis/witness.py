@@ -42,7 +42,11 @@ def measure_support(plant: AxisPlant, point: Point, b: Balance, terms: Sequence[
 
     def leave(laws: Sequence[Term]) -> float:
         """What is left beside noise."""
-        of = [begin_at(name, own, errors(b, t).get(name, {})) for t in laws for name, own in effects(b, t).items()]
+        of = [
+            begin_at(name, own, errors(b, t).get(name, {}), b.travel)
+            for t in laws
+            for name, own in effects(b, t).items()
+        ]
         free = found | {f.name: f for law in of for f in law.free}
         start = {**point, **{name: value for law in of for name, value in law.starts[0].items()}}
         return excess(fit(plant, list(free.values()), start, blocks, max_iterations=N_ITERATIONS).residuals)

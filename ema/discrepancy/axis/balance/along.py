@@ -10,6 +10,7 @@ from numpy.polynomial.chebyshev import chebvander
 
 from ema.core.records import Array
 from ema.discrepancy.axis.linear import in_metres
+from ema.effects.position_line import EFFECT as POSITION_LINE
 from ema.effects.stiffening_spring import EFFECT, bends, tilts
 
 from .law import BY_RECORD, Acting, Columns, Law, Values, one
@@ -250,10 +251,10 @@ def _line_along(n: float, step: float, u: Units) -> Law:
     law = _torque_line(
         TRAVEL_LINE,
         f"line {n:.8g}",
-        "position_line",
+        POSITION_LINE.name,
         n,
-        f"a {u.said} of {{amplitude:.3g}} {u.torque} once in {2.0 * np.pi / n:.4g} m of travel",
-        "slow motion over the whole travel",
+        in_metres(POSITION_LINE.sentence).replace("{period:.4g}", f"{2.0 * np.pi / n:.4g}"),
+        POSITION_LINE.separated_by,
         u,
     )
     return replace(law, finer=lambda share: [_line_along(n + side * share * step, step, u) for side in (-1.0, 1.0)])

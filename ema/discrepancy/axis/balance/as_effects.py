@@ -143,6 +143,7 @@ _MAKERS: Mapping[str, _Maker] = {
     "quadratic_drag": _as_it_is("quadratic_drag", "coefficient"),
     "constant_load": _as_it_is("constant_load", "torque"),
     "cogging": _as_it_is("cogging", "amplitude", "order", "phase"),
+    "position_line": _as_it_is("position_line", "amplitude", "order", "phase"),
     "gear_error": _as_it_is("gear_error", "amplitude", "order", "phase"),
     "load_friction": _of_friction("load_friction", "per_torque", "share"),
     "friction_slope": _of_friction("friction_slope", "slope", "slope", "centre"),

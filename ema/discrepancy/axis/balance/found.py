@@ -86,6 +86,11 @@ class Balance:
     given: tuple[Law, ...] = ()
     creeps: float = 0.0
 
+    @property
+    def travel(self) -> float:
+        """Of the motion in the records. [rad or m]"""
+        return float(np.ptp(self.model.rows.motion.theta))
+
     def confidence(self, term: Term) -> float:
         """How often the law wins, times its mark over that and what of the rest it may have been taken for.
 
