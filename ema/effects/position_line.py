@@ -1,7 +1,7 @@
 """A force that repeats along the travel: a linear motor's magnets, the pitch of a screw, the teeth of a belt.
 
-No whole number of its periods fits into a travel, and it does not close after a turn: on an axis that turns it is cogging
-or an error of the gear.
+No whole number of its periods fits into a travel, and it does not close after a turn: on an axis that turns it is
+cogging, or an error of the gear.
 
 References
 ----------
@@ -23,8 +23,8 @@ EFFECT = Effect(
         Parameter("phase", "rad", 0.0, -pi, pi, 0.0, "phase at a position of zero"),
     ),
     derived={"period": lambda v: 2.0 * pi / v["order"]},
-    sentence="a force of {amplitude:.3g} N m once in {period:.4g} m of travel (magnets of a linear motor, pitch of a screw "
-    "or a belt)",
+    sentence="a force of {amplitude:.3g} N m once in {period:.4g} m of travel (magnets of a linear motor, pitch of a "
+    "screw or a belt)",
     separated_by="slow motion over the whole travel, with the drive off where it can be pulled",
     plants=("axis",),
 )

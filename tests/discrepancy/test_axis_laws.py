@@ -195,7 +195,7 @@ def test_free_runs_find_the_friction_that_a_share_per_kelvin_is_of(geared):
     """Held where the balance had it, 16 % off, a record needed a drive that reads 19 % too much beside it."""
     C, activation = 2e-3, 4500.0
     plant = plant_of(geared, C=C, viscous_activation=activation, warms=(20.0, 56.0, 2.0), temperature=True, seconds=8.0)
-    law = begin_at("viscous_by_temperature", {"per_kelvin": 0.06, "coefficient": 0.8 * C}, {})
+    law = begin_at("viscous_by_temperature", {"per_kelvin": 0.06, "coefficient": 0.8 * C}, {}, 6.0)
     gain = Free("drive_gain.gain", "1", -0.5, 0.5, 0.0, 0.01)
     free, blocks = [*plant.base, *law.free], list(range(len(plant.blocks)))
     found = fit(plant, free, {**{f.name: f.start for f in plant.base}, **law.starts[0]}, blocks)

@@ -32,10 +32,11 @@ class Table:
     ripple: float = 0.1  # [N] rms of the recorded force
     hz: int = 1000
     magnets: tuple[tuple[float, float, float], ...] = ()  # force [N], period [m] and phase, the linear motor's own
+    tight: tuple[float, float, float] = (0.0, 0.0, 0.0)  # from here to there [m] dry friction is so much more [N]
 
 
 @njit(cache=True)
-def _table(reference, hz, M, F_d, Cp, Cn, constant, quadratic, spring, stribeck, counts, noise, magnets, out):
+def _table(reference, hz, M, F_d, Cp, Cn, constant, quadratic, spring, stribeck, counts, noise, magnets, tight, out):
     q, v, fine = 0.0, 0.0, 40
     dt = 1.0 / (hz * fine)
     for k in range(len(reference)):
@@ -49,7 +50,8 @@ def _table(reference, hz, M, F_d, Cp, Cn, constant, quadratic, spring, stribeck,
             for m in range(len(magnets)):
                 drag += magnets[m, 0] * np.cos(2.0 * np.pi * q / magnets[m, 1] + magnets[m, 2])
             free = v + dt / M * (force - drag)
-            stop = dt / M * (F_d + stribeck * np.exp(-abs(v) / 0.02))
+            more = tight[2] if tight[0] < q < tight[1] else 0.0
+            stop = dt / M * (F_d + more + stribeck * np.exp(-abs(v) / 0.02))
             before = v
             v = 0.0 if abs(free) <= stop else free - np.sign(free) * stop
             q += 0.5 * dt * (before + v)
@@ -76,7 +78,7 @@ def table(bench: Table, seed: int, *, seconds: float = 16.0) -> Record:
     _table(
         reference, bench.hz, bench.M, bench.F_d, bench.C_positive, bench.C_negative, bench.constant, bench.quadratic,
         bench.spring, bench.stribeck, bench.counts, noise,
-        np.array(bench.magnets).reshape(-1, 3), out,
+        np.array(bench.magnets).reshape(-1, 3), bench.tight, out,
     )  # fmt: skip
     force = out[1] + bench.ripple * rng.standard_normal(n)
     return Record((Cycle(0, {"t": t, "q": out[0], "force": force, "q_ref": reference}),))

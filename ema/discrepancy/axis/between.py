@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ema.discrepancy.examine import examine
-from ema.discrepancy.fitting import fit
+from ema.discrepancy.fitting import Fit, fit
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Free, Point
 from ema.discrepancy.progress import Progress
@@ -203,7 +203,10 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
 
     def taken(way: str) -> Tried:
         plant.between = way
-        point = _shorten_delays(outcome.point, (LATE[way] - LATE[here]) * period)
+        less = (LATE[way] - LATE[here]) * period
+        if way != here and OF_DRIVE.keys() & outcome.point.keys():
+            return Tried((), (), (), tuple(_with_constant_delay(plant, outcome.point, less).residuals))
+        point = _shorten_delays(outcome.point, less)
         return Tried((), (), (), tuple(plant.residuals([point], blocks)[0]))
 
     ways = {way: taken(way) for way in LATE}
@@ -217,6 +220,18 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     later = sum(outcome.point.get(name, 0.0) for name in OF_DRIVE) / period
     by_drive = [way for way in LATE if way != "straight" and abs(later - LATE[way]) < NEARLY_HALF]
     return ("held" if by_half else next(iter(by_drive), here)) if here == "straight" else here
+
+
+def _with_constant_delay(plant: AxisPlant, point: Point, less: float) -> Fit:
+    """The fit at a point whose drive is late by a constant time in the place of what delays it, `less` than that.
+
+    Of either sign: what lags by one way to take the drive may be early by another.
+    """
+    name = "clock_skew.late"
+    late = sum(point.get(own, 0.0) for own in OF_DRIVE) - less
+    others = {own: value for own, value in point.items() if own not in OF_DRIVE}
+    delay = Free(name, "s", OF_DRIVE[name], np.inf, late, 0.1 * _period(plant))
+    return fit(plant, [*plant.base, delay], {**others, name: late}, range(len(plant.blocks)))
 
 
 def _period(plant: AxisPlant) -> float:

@@ -86,7 +86,7 @@ def begin_at(name: str, values: dict[str, float], unsure: dict[str, float], trav
 
 
 def _line(name: str, values: dict[str, float], travel: float) -> Candidate:
-    """Of a turn the order is a whole number, or the gear's; along a `travel` it is fitted, up to a period more or less."""
+    """Of a turn the order is whole, or the gear's; along a `travel` it is fitted, up to a period more or less."""
     start, A, order = line_point(name, values), values["amplitude"], values["order"]
     free = [Free(key, "N m", -ROOM * A, ROOM * A, value, 0.1 * A, 1e-3 * A) for key, value in start.items()]
     if name == POSITION_LINE.name:

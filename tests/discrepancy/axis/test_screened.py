@@ -41,12 +41,12 @@ def test_what_a_model_has_is_not_tried_again(plant):
 
 def test_what_a_law_has_at_zero_is_held():
     """An exponential fall of friction has the shape 0: a fit that may move it by nothing has no slope there."""
-    law = begin_at("stribeck", {"excess": 0.4, "speed": 2.4, "shape": 0.0}, {})
+    law = begin_at("stribeck", {"excess": 0.4, "speed": 2.4, "shape": 0.0}, {}, 6.0)
     assert {f.name for f in law.free} == {"stribeck.excess", "stribeck.speed"}
     assert law.starts[0]["stribeck.shape"] == 0.0
 
 
 def test_a_law_of_one_number_leaves_that_to_the_fit():
     """A real servo's balance held quadratic drag beside its free runs, and nothing of it was free: a traceback."""
-    law = begin_at("quadratic_drag", {"coefficient": 2e-4}, {})
+    law = begin_at("quadratic_drag", {"coefficient": 2e-4}, {}, 6.0)
     assert [f.name for f in law.free] == ["quadratic_drag.coefficient"]

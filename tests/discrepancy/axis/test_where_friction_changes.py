@@ -8,7 +8,7 @@ import pytest
 
 from ema.discrepancy.axis.fading import SPEEDS, fading_candidate, fadings
 from ema.discrepancy.axis.sizes import sizes
-from ema.discrepancy.axis.stretch import WIDTHS, stretch_candidate
+from ema.discrepancy.axis.stretch import FORMS, WIDTHS, stretch_candidate
 from ema.discrepancy.axis.weak_form import weak_form
 
 AT = {"F_d": on_paper.F_D}
@@ -88,7 +88,7 @@ def test_a_tight_stretch_is_looked_for_where_it_is(with_tight):
     assert start["position_friction.centre"] == pytest.approx(CENTRE, abs=0.3 * WIDTH)
     assert start["position_friction.height"] == pytest.approx(HEIGHT, rel=0.3)
     assert WIDTH / 2.0 < start["position_friction.width"] < WIDTH * 2.0
-    assert len(found.starts) == len(WIDTHS)
+    assert len(found.starts) == len(WIDTHS) * len(FORMS)
 
 
 def test_a_travel_that_is_tight_nowhere_shows_no_height(quiet):

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from ema.core.records import Array
 from ema.discrepancy.axis.linear import in_metres
+from ema.effects.position_friction import EFFECT as STRETCH
+from ema.effects.position_friction import fading
 from ema.effects.position_line import EFFECT as POSITION_LINE
 from ema.effects.stiffening_spring import EFFECT, bends, tilts
 
@@ -22,7 +25,8 @@ LEAST_TURN = 0.3  # [rad] of travel that shows a sine of the angle apart from a 
 HIGHEST_ORDER = 260.0
 FEWEST_PERIODS = 2.0  # of a line within the travel
 CLOSED = 0.1  # of a period: a map of one turn ends a step before it begins
-STRETCHES = (0.05, 0.15)  # half widths of a stretch of other friction, of the travel
+STRETCHES = (0.05, 0.15, 0.3)  # half widths of a stretch of other friction, of the travel
+FORMS = (0.0, 1.0)  # of a stretch: as a Gaussian, alike from end to end
 GROWTHS = (0.3, 1.0, 1.3, 1.7, 2.2, 2.9, 3.7, 4.8)  # exponents from the middle of the travel to an end: what stiffens
 N_POLYNOMIALS = 10  # of a torque along the travel that has no name
 STIFFENING, ANY = "stiffening spring", "torque along the travel"
@@ -80,23 +84,33 @@ def by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[L
             "fast motion in several places",
             is_friction=True,
         )
-    for width in STRETCHES:
+    for width, flatness in product(STRETCHES, FORMS):
         for at in np.linspace(float(m.theta.min()), float(m.theta.max()), N_PLACES):
-            yield Law(
-                "stretch of friction",
-                f"stretch {at:.4g} {width:g}",
-                "position_friction",
-                _stretch(float(at), width * span),
-                {"more": u.torque, "centre": u.place, "width": u.place},
-                one("more", centre=float(at), width=width * span),
-                f"friction is {{more:+.3g}} {u.torque} other around {{centre:.3g}} {u.place} ± {{width:.2g}} {u.place}",
-                "slow motion over the whole travel",
-                is_friction=True,
-            )
+            yield _stretch(float(at), width * span, flatness, span / N_PLACES, u)
 
 
-def _stretch(at: float, width: float) -> Columns:
-    return lambda m, _: (m.direction * np.exp(-(((m.theta - at) / width) ** 2)),)
+def _stretch(at: float, width: float, flatness: float, apart: float, u: Units) -> Law:
+    """One of a family whose centres lie `apart`, and whose widths about a factor of two."""
+
+    def columns(m: Motion, _: Acting) -> tuple[Array, ...]:
+        return (m.direction * np.exp(-fading((m.theta - at) / width, flatness)),)
+
+    def finer(share: float) -> list[Law]:
+        moved = [_stretch(at + side * share * apart, width, flatness, apart, u) for side in (-1.0, 1.0)]
+        return [*moved, *(_stretch(at, width * 2.0**grown, flatness, apart, u) for grown in (-share, share))]
+
+    return Law(
+        "stretch of friction",
+        f"stretch {at:.4g} {width:.4g} {flatness:g}",
+        STRETCH.name,
+        columns,
+        {"more": u.torque, "centre": u.place, "width": u.place},
+        one("more", centre=at, width=width, flatness=flatness),
+        f"friction is {{more:+.3g}} {u.torque} other around {{centre:.3g}} {u.place} ± {{width:.2g}} {u.place}",
+        "slow motion over the whole travel",
+        is_friction=True,
+        finer=finer,
+    )
 
 
 def _spring(centre: float, u: Units) -> Law:

@@ -148,7 +148,7 @@ _MAKERS: Mapping[str, _Maker] = {
     "load_friction": _of_friction("load_friction", "per_torque", "share"),
     "friction_slope": _of_friction("friction_slope", "slope", "slope", "centre"),
     "stribeck": _of_friction("stribeck", "excess", "more", "speed", "shape"),
-    "position_friction": _of_friction("position_friction", "height", "more", "centre", "width"),
+    "position_friction": _of_friction("position_friction", "height", "more", "centre", "width", "flatness"),
     "spring_load": _Maker(_spring),
     "stiffening_spring": _as_it_is("stiffening_spring", *(p.name for p in EFFECT.parameters)),
     "drive_unequal": _Maker(lambda v, _, k_t: {"drive_unequal": {"per_ampere": v["share"] * k_t}}),
