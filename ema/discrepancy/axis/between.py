@@ -204,10 +204,11 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     def taken(way: str) -> Tried:
         plant.between = way
         less = (LATE[way] - LATE[here]) * period
+        shorter = plant.residuals([_shorten_delays(outcome.point, less)], blocks)[0]
+        found = [Tried((), (), (), tuple(shorter))]
         if way != here and OF_DRIVE.keys() & outcome.point.keys():
-            return Tried((), (), (), tuple(_with_constant_delay(plant, outcome.point, less).residuals))
-        point = _shorten_delays(outcome.point, less)
-        return Tried((), (), (), tuple(plant.residuals([point], blocks)[0]))
+            found.append(Tried((), (), (), tuple(_with_constant_delay(plant, outcome.point, less).residuals)))
+        return max(found, key=lambda own: compare(own, found[0]).gain)
 
     ways = {way: taken(way) for way in LATE}
     plant.between = here

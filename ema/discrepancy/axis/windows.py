@@ -28,7 +28,7 @@ TINY = 1e-300
 AT_REST = 3.0  # noise amplitudes of the smoothed speed below which nothing is seen to move
 SHORTEST_REST = 3  # samples
 START_NOISE = 1.5 / np.sqrt(2 * HALF + 1)  # of a smoothed start state, per noise of one sample
-BENT = 1.5  # times noise that a local quadratic leaves: of eleven samples chance leaves as much once in a hundred
+BENT = 2.0  # times noise that a part's first quadratic leaves: of eleven samples chance leaves as much once in 1e5
 STRETCH = 0.4  # [s] windows closer together are not independent enough to check one another
 PER_CYCLE = 1_000_000  # stretches and parts that a cycle may have
 
@@ -256,14 +256,19 @@ def _start_states(
 
 
 def _misfit(x: Array, gaps: NDArray[np.int_], sigma: Array, width: int) -> Array:
-    """Rms of what local quadratics leave of the samples that each is fitted to, over that of noise; by sample."""
+    """By sample up to half a width into each part: the rms, over noise, that its first quadratic leaves there; else 0.
+
+    Further in, each sample stands in the middle of its own quadratic, and what bends about it takes little off it.
+    """
     of_noise = 1.0 - savgol_coeffs(width, 2)[width // 2]
-    power = ((x - _smooth(x, gaps, width)) / np.maximum(sigma, TINY)) ** 2 / of_noise
     out = []
-    for part in np.split(power, gaps):
-        mean = np.convolve(part, np.full(min(width, len(part)), 1.0 / min(width, len(part))), mode="valid")
-        before = width // 2  # samples at an end share its quadratic
-        out.append(np.pad(mean, (before, len(part) - len(mean) - before), mode="edge") if len(part) >= width else part)
+    for part in np.split(((x - _smooth(x, gaps, width)) / np.maximum(sigma, TINY)) ** 2 / of_noise, gaps):
+        first = np.zeros(len(part))
+        if len(part) >= 2 * width:
+            mean = np.convolve(part[: 2 * width], np.full(width, 1.0 / width), mode="valid")
+            first[: width // 2] = mean[0]
+            first[width // 2 : width // 2 + len(mean)] = mean
+        out.append(first)
     return np.sqrt(np.concatenate(out))
 
 
