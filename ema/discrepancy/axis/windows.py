@@ -234,7 +234,7 @@ def _start_states(
 
     A torque that varies within a few samples, as cogging of a light rotor, bends speed by more than its noise: what
     smoothing takes off it is no deviation that noise makes, and grows in the window. The last array says by how many
-    times the noise what was smoothed is no local quadratic about each sample, as where a record begins with a jump of
+    times the noise what was smoothed is no quadratic at the begin of a part, as where a record begins with a jump of
     the drive.
     """
     position, speed = smooth
@@ -256,9 +256,10 @@ def _start_states(
 
 
 def _misfit(x: Array, gaps: NDArray[np.int_], sigma: Array, width: int) -> Array:
-    """By sample up to half a width into each part: the rms, over noise, that its first quadratic leaves there; else 0.
+    """Rms, over noise, that the quadratic of each sample leaves of those it is fitted to, where a part begins; else 0.
 
-    Further in, each sample stands in the middle of its own quadratic, and what bends about it takes little off it.
+    Before the middle of the first quadratic a start is at an end of it, where what bends takes most off it. Further in,
+    each sample stands in the middle of its own.
     """
     of_noise = 1.0 - savgol_coeffs(width, 2)[width // 2]
     out = []
