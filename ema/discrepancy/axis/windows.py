@@ -28,7 +28,6 @@ TINY = 1e-300
 AT_REST = 3.0  # noise amplitudes of the smoothed speed below which nothing is seen to move
 SHORTEST_REST = 3  # samples
 START_NOISE = 1.5 / np.sqrt(2 * HALF + 1)  # of a smoothed start state, per noise of one sample
-BENT = 2.0  # times noise that a part's first quadratic leaves: of eleven samples chance leaves as much once in 1e5
 STRETCH = 0.4  # [s] windows closer together are not independent enough to check one another
 PER_CYCLE = 1_000_000  # stretches and parts that a cycle may have
 
@@ -200,15 +199,14 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
     load = known_load(cycle, who.load)
     number = cycle.number * PER_CYCLE  # stretches and parts of different cycles are different
     starts = np.array([0, *gaps])
-    *started, misfit = _start_states(cycle, who, noise, gaps, (smooth, speed))
+    started = _start_states(cycle, who, noise, gaps, (smooth, speed))
     pieces = zip(*(np.split(x, gaps) for x in (t, cycle[who.drive], load, raw, *started)), strict=True)
     parts = [Part(number + start, *piece) for start, piece in zip(starts.tolist(), pieces, strict=True)]
     for a, b in pairwise(edges.tolist()):
         if any(start <= a < stop for start, stop in rests):
             continue
         n_parts = max(1, round((b - a) / n_window))
-        for part_of in np.array_split(np.arange(a, b), n_parts):
-            inside = part_of[_find_start(misfit[part_of]) :]
+        for inside in np.array_split(np.arange(a, b), n_parts):
             if len(inside) < MIN_WINDOW:
                 continue
             rows = slice(int(inside[0]), int(inside[-1]) + 1)
@@ -229,55 +227,22 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
 
 def _start_states(
     cycle: Cycle, who: Roles, noise: dict[str, Noise], gaps: NDArray[np.int_], smooth: tuple[Array, Array]
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array]:
     """Position and speed from which windows may begin, smoothed no wider than the motion is a local quadratic.
 
     A torque that varies within a few samples, as cogging of a light rotor, bends speed by more than its noise: what
-    smoothing takes off it is no deviation that noise makes, and grows in the window. The last array says by how many
-    times the noise what was smoothed is no quadratic at the begin of a part, as where a record begins with a jump of
-    the drive.
+    smoothing takes off it is no deviation that noise makes, and grows in the window.
     """
     position, speed = smooth
-    misfit = np.zeros(cycle.n_samples)
     if who.position is not None:
         x, sigma = cycle[who.position], noise[who.position].rms(speed)
-        width = _width(x, gaps, sigma, WIDTHS)
-        position = _smooth(x, gaps, width)
+        position = _smooth(x, gaps, _width(x, gaps, sigma, WIDTHS))
         if who.speed is None:
-            width = _width(x, gaps, sigma, tuple(2 * n - 1 for n in WIDTHS))
-            speed = _smooth(x, gaps, width, cycle.period)
-        misfit = _misfit(x, gaps, sigma, width)
+            speed = _smooth(x, gaps, _width(x, gaps, sigma, tuple(2 * n - 1 for n in WIDTHS)), cycle.period)
     if who.speed is not None:
-        x, sigma = cycle[who.speed], noise[who.speed].rms(np.gradient(speed, cycle["t"]))
-        width = _width(x, gaps, sigma, WIDTHS)
-        speed = _smooth(x, gaps, width)
-        misfit = np.maximum(misfit, _misfit(x, gaps, sigma, width))
-    return position, speed, misfit
-
-
-def _misfit(x: Array, gaps: NDArray[np.int_], sigma: Array, width: int) -> Array:
-    """Rms, over noise, that the quadratic of each sample leaves of those it is fitted to, where a part begins; else 0.
-
-    Before the middle of the first quadratic a start is at an end of it, where what bends takes most off it. Further in,
-    each sample stands in the middle of its own.
-    """
-    of_noise = 1.0 - savgol_coeffs(width, 2)[width // 2]
-    out = []
-    for part in np.split(((x - _smooth(x, gaps, width)) / np.maximum(sigma, TINY)) ** 2 / of_noise, gaps):
-        first = np.zeros(len(part))
-        if len(part) >= 2 * width:
-            mean = np.convolve(part[: 2 * width], np.full(width, 1.0 / width), mode="valid")
-            first[: width // 2] = mean[0]
-            first[width // 2 : width // 2 + len(mean)] = mean
-        out.append(first)
-    return np.sqrt(np.concatenate(out))
-
-
-def _find_start(misfit: Array) -> int:
-    """The first sample of a window's first half from which it may begin, or the one that bends least."""
-    half = misfit[: max(len(misfit) // 2, 1)]
-    settled = np.flatnonzero(half < BENT)
-    return int(settled[0]) if settled.size else int(np.argmin(half))
+        x = cycle[who.speed]
+        speed = _smooth(x, gaps, _width(x, gaps, noise[who.speed].rms(np.gradient(speed, cycle["t"])), WIDTHS))
+    return position, speed
 
 
 def _width(x: Array, gaps: NDArray[np.int_], sigma: Array, widths: tuple[int, ...]) -> int:

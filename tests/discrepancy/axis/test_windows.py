@@ -104,17 +104,3 @@ def test_a_window_begins_where_the_axis_was_however_quickly_it_swings(frequency,
     assert off < 2.0
     assert np.std((part.position - true["theta_m"])[inside]) / noise["theta_m"] < 2.0
     assert narrower or off < 0.6  # eleven samples: a third to a half of the noise
-
-
-def test_a_window_begins_where_its_motion_is_smooth():
-    """A record that begins with a jump: smoothed over it, the axis had a speed that it never had."""
-    speed = 40.0 * (1.0 - np.exp(-T / 4e-3))  # a drive that jumps at t = 0, against drag
-    angle = 40.0 * (T + 4e-3 * (np.exp(-T / 4e-3) - 1.0)) + 1e-5 * RNG.standard_normal(len(T))
-    for channels in ({"theta_m": angle}, {"theta_m": angle, "w_m": speed + 0.01 * RNG.standard_normal(len(T))}):
-        first, *others = bench(
-            PLANT, Record((Cycle(0, {"t": T, "i_q": np.ones(len(T)), **channels}),)), "one", 0.1
-        ).windows
-        k = round(first.t[0] / 1e-3)
-        assert 0 < k < 50
-        assert first.part.speed[first.first] == pytest.approx(speed[k], abs=0.05)
-        assert all(np.diff(np.concatenate([first.t[-1:], *(w.t for w in others)])) < 1.5e-3)  # no other is cut
