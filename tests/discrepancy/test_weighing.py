@@ -156,3 +156,10 @@ def test_probabilities_do_not_depend_on_the_order_of_sets(order):
     parts = {names: np.full(N_PARTS, 0.1 * (names == ONE)) for names in order}
     p = {e.causes: e.probability for e in posterior({n: float(x.sum()) for n, x in parts.items()}, 0.0, parts)}
     assert p[ONE] == pytest.approx(1.0 / (1.0 + np.exp(-4.0)))
+
+
+def test_two_terms_of_one_key_are_counted_once_each():
+    """A sum of two bumps had made probabilities of 2.5."""
+    entries = thin([Entry(("a", "bump", "bump"), 1.0, 0.0, 0.0)], {"a": 0.8, "bump": 1.0})
+    assert sum(e.probability for e in entries) == pytest.approx(1.0)
+    assert p_cause(entries, "a") == pytest.approx(0.8)

@@ -100,7 +100,7 @@ def thin(entries: Sequence[Entry], share: Mapping[str, float]) -> list[Entry]:
     for entry in entries:
         for there in product((True, False), repeat=len(entry.causes)):
             left = tuple(c for c, is_there in zip(entry.causes, there, strict=True) if is_there)
-            weight = [share[c] if c in left else 1.0 - share[c] for c in entry.causes]
+            weight = [share[c] if is_there else 1.0 - share[c] for c, is_there in zip(entry.causes, there, strict=True)]
             p[left] = p.get(left, 0.0) + entry.probability * float(np.prod(weight))
             most[left] = max(most.get(left, entry), entry, key=lambda e: e.probability)
     order = sorted(p, key=lambda causes: -p[causes])
