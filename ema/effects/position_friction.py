@@ -7,6 +7,8 @@ from numba import njit
 from .base import NOT_REVERSED, POSITIVE, Effect, Parameter
 from .vector_math import exp_negative
 
+FORMS = (0.0, 1.0)  # ends of the flatness, where searches begin: as a Gaussian, alike from end to end
+
 
 @njit(inline="always")
 def fading(u, flatness):

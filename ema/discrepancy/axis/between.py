@@ -228,11 +228,15 @@ def _with_constant_delay(plant: AxisPlant, point: Point, less: float) -> Fit:
 
     Of either sign: what lags by one way to take the drive may be early by another.
     """
-    name = "clock_skew.late"
     late = sum(point.get(own, 0.0) for own in OF_DRIVE) - less
     others = {own: value for own, value in point.items() if own not in OF_DRIVE}
-    delay = Free(name, "s", OF_DRIVE[name], np.inf, late, 0.1 * _period(plant))
-    return fit(plant, [*plant.base, delay], {**others, name: late}, range(len(plant.blocks)))
+    return _fit_delay(plant, "clock_skew.late", {**others, "clock_skew.late": late})
+
+
+def _fit_delay(plant: AxisPlant, name: str, point: Point) -> Fit:
+    """The fit of what delays the drive, beside the base parameters."""
+    delay = Free(name, "s", OF_DRIVE[name], np.inf, point[name], 0.1 * _period(plant))
+    return fit(plant, [*plant.base, delay], point, range(len(plant.blocks)))
 
 
 def _period(plant: AxisPlant) -> float:
@@ -248,13 +252,11 @@ def _widen_delay(plant: AxisPlant, outcome: Outcome) -> None:
 
 
 def _widen_by_ways(plant: AxisPlant, outcome: Outcome, name: str, told: list[dict[str, float]]) -> None:
-    blocks, here, fits = list(range(len(plant.blocks))), plant.between, {}
-    period = _period(plant)
-    delay = Free(name, "s", OF_DRIVE[name], np.inf, outcome.point[name], 0.1 * period)
+    here, period, fits = plant.between, _period(plant), {}
     for way in LATE:
         plant.between = way
         point = _shorten_delays(outcome.point, (LATE[way] - LATE[here]) * period)
-        fits[way] = fit(plant, [*plant.base, delay], point, blocks)
+        fits[way] = _fit_delay(plant, name, point)
     plant.between = here
     tried = {way: Tried((), (), (), tuple(f.residuals)) for way, f in fits.items()}
     for way, f in fits.items():

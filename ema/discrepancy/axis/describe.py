@@ -12,7 +12,7 @@ from ema.effects import registry
 
 from .cogging import MIN_LINE
 from .interval import interval
-from .linear import by_drive, of_axis
+from .linear import by_drive, of_axis, units_of
 from .naming import numbers_of
 
 if TYPE_CHECKING:
@@ -36,9 +36,7 @@ def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Se
             if effect.name == "cogging" and values["amplitude"] < MIN_LINE * strongest:
                 continue
             said = _said(plant)
-            unit = {
-                p.name: p.unit if p.name == "phase" else said(p.unit) for p in effect.parameters
-            }  # no angle of the axis
+            unit = units_of(effect, said)
             parameters = {}
             for name, value in values.items():
                 spread = [s.effects[key][name] for s in samples if key in s.effects]

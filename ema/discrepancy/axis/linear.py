@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ema.effects.base import Effect
 
 SAID = {  # of those that begin alike the longest first
     "N m s²/rad²": "N s²/m²",
@@ -54,6 +59,11 @@ def of_axis(text: str, *, linear: bool) -> str:
     for said, instead in APART.items():
         text = text.replace(said, instead)
     return text
+
+
+def units_of(effect: Effect, said: Callable[[str], str]) -> dict[str, str]:
+    """Units of an effect's parameters, as they are said; a phase is no angle of the axis."""
+    return {p.name: p.unit if p.name == "phase" else said(p.unit) for p in effect.parameters}
 
 
 def in_metres(text: str) -> str:

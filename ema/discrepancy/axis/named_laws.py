@@ -13,7 +13,7 @@ from ema.effects import registry
 from .balance.as_effects import draw_effects, effects, friction
 from .balance.found import Balance, Term
 from .interval import interval
-from .linear import of_axis
+from .linear import of_axis, units_of
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -43,7 +43,7 @@ def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.Found
     said = partial(of_axis, linear=linear)
     values = effects(b, term)[name]
     samples = [drawn[name] for drawn in draw_effects(b, term)]
-    units = {p.name: said(p.unit) for p in effect.parameters}
+    units = units_of(effect, said)
     parameters = {
         key: shared.Quantity(value, *interval(key, value, [s[key] for s in samples]), units[key])
         for key, value in values.items()

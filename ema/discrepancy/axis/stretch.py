@@ -11,7 +11,7 @@ import numpy as np
 from ema.core.records import Array
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
-from ema.effects.position_friction import fading
+from ema.effects.position_friction import FORMS, fading
 
 from .weak_form import FEWEST, Weak, weak_form
 
@@ -24,7 +24,6 @@ NAME = "position_friction"
 WIDTHS = np.geomspace(0.01, 0.6, 8)  # of half the travel
 RATIO = float(WIDTHS[1] / WIDTHS[0])
 N_FINER = 4  # times that the steps between those are halved
-FORMS = (0.0, 1.0)  # as a Gaussian, alike from end to end
 LOWEST, HIGHEST = -0.95, 10.0  # of a stretch's friction, over that elsewhere
 SPACING = 0.7  # of centres, in widths
 LEAST = 1e-3  # of a column that must be left beside friction, drag and inertia
@@ -63,9 +62,9 @@ def _gains(every: Sequence[_Stretch], weak: Weak, q: Array, rest: Array) -> Arra
     return np.where(is_seen, (left.T @ rest) ** 2 / np.maximum(power, 1e-300), 0.0)
 
 
-def _frictions(stretch: _Stretch, weak: Weak) -> tuple[float, float]:
+def _frictions(stretch: _Stretch, weak: Weak, always: Array) -> tuple[float, float]:
     """By how much friction is another than the model's, everywhere and in the stretch beside that. [N m]"""
-    A = np.column_stack([np.stack(weak.always(), axis=1) / weak.sigma[:, None], _columns([stretch], weak)])
+    A = np.column_stack([always / weak.sigma[:, None], _columns([stretch], weak)])
     (_, everywhere, *_, there), *_ = np.linalg.lstsq(A, weak.y / weak.sigma, rcond=None)
     return float(everywhere), float(there)
 
@@ -78,6 +77,7 @@ def stretch_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Seque
     if len(weak.y) < FEWEST:
         return None
     q, rest = weak.beside()
+    always = np.stack(weak.always(), axis=1)
     low, high = float(weak.motion.theta.min()), float(weak.motion.theta.max())
     h = max(s.half_range, 1e-12)
     friction = next(f for f in plant.base if f.name == "F_d")
@@ -89,7 +89,7 @@ def stretch_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Seque
             best = _best([best, *best.near(0.5**k)], weak, q, rest)
         gain = float(_gains([best], weak, q, rest)[0])
         if gain > 0.0:
-            elsewhere, size = _frictions(best, weak)
+            elsewhere, size = _frictions(best, weak, always)
             F_d = float(np.clip(point["F_d"] + elsewhere, max(friction.low, 1e-3 * s.torque), friction.high))
             height = float(np.clip(size / F_d, LOWEST, HIGHEST))
             values = {"height": height, "centre": best.centre, "width": best.width, "flatness": flatness}

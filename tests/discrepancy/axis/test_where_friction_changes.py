@@ -8,8 +8,9 @@ import pytest
 
 from ema.discrepancy.axis.fading import SPEEDS, fading_candidate, fadings
 from ema.discrepancy.axis.sizes import sizes
-from ema.discrepancy.axis.stretch import FORMS, WIDTHS, stretch_candidate
+from ema.discrepancy.axis.stretch import WIDTHS, stretch_candidate
 from ema.discrepancy.axis.weak_form import weak_form
+from ema.effects.position_friction import FORMS
 
 AT = {"F_d": on_paper.F_D}
 EXCESS, SPEED = 0.6, 0.8

@@ -12,7 +12,7 @@ from numpy.polynomial.chebyshev import chebvander
 from ema.core.records import Array
 from ema.discrepancy.axis.linear import in_metres
 from ema.effects.position_friction import EFFECT as STRETCH
-from ema.effects.position_friction import fading
+from ema.effects.position_friction import FORMS, fading
 from ema.effects.position_line import EFFECT as POSITION_LINE
 from ema.effects.stiffening_spring import EFFECT, bends, tilts
 
@@ -26,7 +26,6 @@ HIGHEST_ORDER = 260.0
 FEWEST_PERIODS = 2.0  # of a line within the travel
 CLOSED = 0.1  # of a period: a map of one turn ends a step before it begins
 STRETCHES = (0.05, 0.15, 0.3)  # half widths of a stretch of other friction, of the travel
-FORMS = (0.0, 1.0)  # of a stretch: as a Gaussian, alike from end to end
 GROWTHS = (0.3, 1.0, 1.3, 1.7, 2.2, 2.9, 3.7, 4.8)  # exponents from the middle of the travel to an end: what stiffens
 N_POLYNOMIALS = 10  # of a torque along the travel that has no name
 STIFFENING, ANY = "stiffening spring", "torque along the travel"
@@ -90,7 +89,7 @@ def by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[L
 
 
 def _stretch(at: float, width: float, flatness: float, apart: float, u: Units) -> Law:
-    """One of a family whose centres lie `apart`, and whose widths about a factor of two."""
+    """One of a family whose centres lie about `apart`, and whose widths about a factor of two."""
 
     def columns(m: Motion, _: Acting) -> tuple[Array, ...]:
         return (m.direction * np.exp(-fading((m.theta - at) / width, flatness)),)
