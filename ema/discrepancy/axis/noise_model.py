@@ -10,6 +10,7 @@ from scipy.ndimage import maximum_filter1d
 from ema.core.records import Array
 from ema.models.axis_config import Axis
 
+from .pushed import LEAST_R, pushed
 from .whitening import Filter, design, open_loop_variance, variance_without_start
 from .windows import HALF, START_NOISE, Bench, Window, speed_noise
 
@@ -61,8 +62,7 @@ def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseM
     With `turning` not better than `TURNING` around it: a residual that is weighed by its noise must not rest on it.
     """
     kind = b.roles.kind
-    k_t = 1.0 if kind == "force" else float(p.k_t or 1.0)
-    k_e, R, L, J = float(p.k_e or 0.0), max(float(p.R or 0.0), 1e-9), float(p.L or 0.0), p.inertia
+    k_e, R, L, J = float(p.k_e or 0.0), max(float(p.R or 0.0), LEAST_R), float(p.L or 0.0), p.inertia
     acceleration = np.gradient(w.speed, w.t)
     drive_noise = b.noise[b.roles.drive].rms(np.gradient(w.drive, w.t))
     rows, noise = [], []
@@ -82,15 +82,8 @@ def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseM
             rows.append((0.0, -k_e / R if kind == "voltage" else -(p.loop.K_w if p.loop else 0.0)))
             through = np.sqrt(w.period / (2.0 * L / R + w.period)) / R * drive_noise if kind == "voltage" else 0.0
             noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
-    gain, damping = {
-        "current": (k_t, p.C / J),
-        "force": (1.0, p.C / J),
-        "voltage": (k_t / R, (p.C + k_t * k_e / R) / J),
-        "speed-loop": (k_t * (p.loop.K_w if p.loop else 0.0),) * 2,
-    }[kind]
-    if kind == "speed-loop":
-        damping = gain / J
-    process = np.hypot(gain * drive_noise, b.load_noise) / J
+    gain, damping = pushed(p, kind)
+    process = np.hypot(gain * drive_noise, b.load_noise / J)
     speed = w.part.speed[w.first : w.first + w.n]  # smoothed no wider than it bends: a stop is at its own sample
     at_rest = np.abs(speed) < 3.0 * START_NOISE * speed_noise(b.roles, b.noise, w.period)
     process = np.where(at_rest & np.roll(at_rest, 1) & np.roll(at_rest, -1), 0.0, process)

@@ -17,6 +17,7 @@ from ema.models.axis_config import Axis
 
 from .channels import MIN_SAMPLES, Roles, find_runs, known_load, roles
 from .noise import ESTIMATE_UNCERTAINTY, Noise, estimate, is_derived
+from .pushed import pushed
 
 HALF = 5  # samples on each side of a local quadratic
 WIDTHS = (2 * HALF + 1, 7, 5)  # samples of one from which a window may begin: no wider than the motion lets it
@@ -155,7 +156,7 @@ def bench(plant: Axis, record: Record, name: str, length: float) -> Bench:
         if static:
             windows += _static(name, cycle, who)
         else:
-            windows += _moving(length, name, cycle, who, noise)
+            windows += _moving(plant, length, name, cycle, who, noise)
     if not windows:
         longest = max(cycle.n_samples for cycle in record)
         raise RecordError(
@@ -172,7 +173,7 @@ def _noise(plant: Axis, record: Record, name: str) -> Noise:
     return estimate(record.cycles, name, record.resolution.get(name), size)
 
 
-def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str, Noise]) -> list[Window]:
+def _moving(plant: Axis, length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str, Noise]) -> list[Window]:
     n = cycle.n_samples
     if n < MIN_SAMPLES:
         return []
@@ -188,8 +189,10 @@ def _moving(length: float, group: str, cycle: Cycle, who: Roles, noise: dict[str
         raw = smooth = cumulative_trapezoid(speed, t, initial=0.0)
     warmer = cycle["temp_w"] - T_REFERENCE if "temp_w" in cycle else np.zeros(n)
     cuts = _glitches(cycle, who, noise) if who.position is not None and who.speed is not None else np.array([], int)
-    still = np.abs(speed) < AT_REST * START_NOISE * speed_noise(who, noise, dt)
     margin = HALF if who.speed is not None else 2 * HALF  # over which the smoothed speed mixes rest with motion
+    of_drive = pushed(plant, who.kind)[0] * noise[who.drive].rms(np.gradient(cycle[who.drive], t))
+    jolted = of_drive * dt * np.sqrt(2 * margin + 1)  # a speed that the drive's noise makes is no motion to begin from
+    still = np.abs(speed) < AT_REST * np.hypot(START_NOISE * speed_noise(who, noise, dt), jolted)
     rests = _rests(still | _reversals(speed), margin)
     turns = np.flatnonzero(np.diff(np.sign(speed)) != 0.0) + 1
     anew = np.unique(np.concatenate(([0], cuts, gaps, np.flatnonzero(still) + 1, turns)))  # what was before is no lead
@@ -284,10 +287,11 @@ def _rests(still: NDArray[np.bool_], margin: int) -> NDArray[np.int_]:
 def _reversals(speed: Array) -> NDArray[np.bool_]:
     """Samples about each reversal, where friction turns round over a way that no law here describes.
 
-    Only where the stretches between reversals are long enough to stand alone.
+    Only where the stretches between reversals are long enough to stand alone; the first and the last may be lost.
     """
     turns = np.flatnonzero(np.sign(speed[1:]) != np.sign(speed[:-1])) + 1
     between = np.diff(np.concatenate(([0], turns, [len(speed)])))
+    between[[0, -1]] = len(speed)
     out = np.zeros(len(speed), dtype=bool)
     for place, k in enumerate(turns):
         if min(between[place], between[place + 1]) >= 2 * MIN_WINDOW:
