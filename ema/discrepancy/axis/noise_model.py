@@ -64,7 +64,7 @@ def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseM
     kind = b.roles.kind
     k_e, R, L, J = float(p.k_e or 0.0), max(float(p.R or 0.0), LEAST_R), float(p.L or 0.0), p.inertia
     acceleration = np.gradient(w.speed, w.t)
-    drive_noise = b.noise[b.roles.drive].rms(np.gradient(w.drive, w.t))
+    drive_noise = b.noise[b.roles.drive].rms(np.gradient(w.drive, w.t))  # of what is slow in it, too
     rows, noise = [], []
     for place, name in enumerate(b.roles.outputs):
         sigma = b.noise[name]
@@ -76,11 +76,12 @@ def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseM
             noise.append(sigma.rms(acceleration))
         elif name == "u_q":
             rows.append((0.0, k_e))
-            through = np.hypot(R, L / (np.sqrt(2.0) * w.period)) * drive_noise
+            through = np.hypot(R, L / (np.sqrt(2.0) * w.period)) * np.sqrt(w.left) * drive_noise
             noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
         else:
             rows.append((0.0, -k_e / R if kind == "voltage" else -(p.loop.K_w if p.loop else 0.0)))
-            through = np.sqrt(w.period / (2.0 * L / R + w.period)) / R * drive_noise if kind == "voltage" else 0.0
+            passed = np.sqrt(np.minimum(w.left, w.period / (2.0 * L / R + w.period)))
+            through = passed / R * drive_noise if kind == "voltage" else 0.0
             noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
     gain, damping = pushed(p, kind)
     process = np.hypot(gain * drive_noise, b.load_noise / J)

@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from ema.core.errors import RecordError
 from ema.core.records import Array, Cycle, Record
@@ -16,8 +15,10 @@ from ema.effects.base import T_REFERENCE
 from ema.models.axis_config import Axis
 
 from .channels import MIN_SAMPLES, Roles, find_runs, known_load, roles
+from .local_quadratics import left_of_noise, smooth
 from .noise import ESTIMATE_UNCERTAINTY, Noise, estimate, is_derived
 from .pushed import pushed
+from .quiet_drive import quieten
 
 HALF = 5  # samples on each side of a local quadratic
 WIDTHS = (2 * HALF + 1, 7, 5)  # samples of one from which a window may begin: no wider than the motion lets it
@@ -37,20 +38,21 @@ PER_CYCLE = 1_000_000  # stretches and parts that a cycle may have
 class Part:
     """Samples of one cycle from gap to gap, in arrays of shape (n_times,).
 
-    Drive, torque of a known load and position as recorded, position and speed to begin from; `number` is like no other
-    part's of the record.
+    Drive with less noise (`quiet_drive.py`; a share `left` of its variance is in it), torque of a known load and
+    position as recorded, position and speed to begin from; `number` is like no other part's of the record.
     """
 
     number: int
     t: Array
     drive: Array
+    left: Array
     load: Array
     recorded: Array
     position: Array
     speed: Array
 
 
-NO_PART = Part(-1, *(np.empty(0) for _ in range(6)))  # of readings at rest
+NO_PART = Part(-1, *(np.empty(0) for _ in range(7)))  # of readings at rest
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,11 @@ class Window:
     def n(self) -> int:
         """Number of samples."""
         return len(self.t)
+
+    @property
+    def left(self) -> Array:
+        """Share of the variance of the drive's noise that is left in the drive, shape (n_times,)."""
+        return self.part.left[self.first : self.first + self.n]
 
     @property
     def period(self) -> float:
@@ -183,10 +190,10 @@ def _moving(plant: Axis, length: float, group: str, cycle: Cycle, who: Roles, no
     gaps = np.flatnonzero(np.diff(t) > 5.0 * dt) + 1
     if who.position is not None:
         raw = cycle[who.position]
-        smooth = _smooth(raw, gaps, width)
-    speed = _smooth(cycle[who.speed], gaps, width) if who.speed is not None else _smooth(raw, gaps, 2 * width - 1, dt)
+        smoothed = smooth(raw, gaps, width)
+    speed = smooth(cycle[who.speed], gaps, width) if who.speed is not None else smooth(raw, gaps, 2 * width - 1, dt)
     if who.position is None:
-        raw = smooth = cumulative_trapezoid(speed, t, initial=0.0)
+        raw = smoothed = cumulative_trapezoid(speed, t, initial=0.0)
     warmer = cycle["temp_w"] - T_REFERENCE if "temp_w" in cycle else np.zeros(n)
     cuts = _glitches(cycle, who, noise) if who.position is not None and who.speed is not None else np.array([], int)
     margin = HALF if who.speed is not None else 2 * HALF  # over which the smoothed speed mixes rest with motion
@@ -200,10 +207,11 @@ def _moving(plant: Axis, length: float, group: str, cycle: Cycle, who: Roles, no
     n_window = max(MIN_WINDOW, round(length / dt))
     out = []
     load = known_load(cycle, who.load)
+    drive, left = quieten(t, cycle[who.drive], gaps, noise[who.drive])
     number = cycle.number * PER_CYCLE  # stretches and parts of different cycles are different
     starts = np.array([0, *gaps])
-    started = _start_states(cycle, who, noise, gaps, (smooth, speed))
-    pieces = zip(*(np.split(x, gaps) for x in (t, cycle[who.drive], load, raw, *started)), strict=True)
+    started = _start_states(cycle, who, noise, gaps, (smoothed, speed))
+    pieces = zip(*(np.split(x, gaps) for x in (t, drive, left, load, raw, *started)), strict=True)
     parts = [Part(number + start, *piece) for start, piece in zip(starts.tolist(), pieces, strict=True)]
     for a, b in pairwise(edges.tolist()):
         if any(start <= a < stop for start, stop in rests):
@@ -216,12 +224,12 @@ def _moving(plant: Axis, length: float, group: str, cycle: Cycle, who: Roles, no
             outputs = np.stack([cycle[name][rows] for name in who.outputs])
             label = f"{group}, {cycle}, {t[rows][0]:.4g} s"
             stretch = number + int((t[rows][0] - t[0]) / max(STRETCH, length))
-            given = (t[rows], cycle[who.drive][rows], load[rows], outputs)
-            motion = (*given, smooth[rows], speed[rows], float(np.mean(warmer[rows])))
+            given = (t[rows], drive[rows], load[rows], outputs)
+            motion = (*given, smoothed[rows], speed[rows], float(np.mean(warmer[rows])))
             k = int(np.searchsorted(starts, a, side="right")) - 1
             earliest = anew[np.searchsorted(anew, rows.start, side="right") - 1]
             first, since = rows.start - int(starts[k]), int(earliest - starts[k])
-            course, part = (t, cycle[who.drive]), parts[k]
+            course, part = (t, drive), parts[k]
             out.append(
                 Window(group, label, *motion, stretch=stretch, course=course, part=part, first=first, earliest=since)
             )
@@ -229,43 +237,34 @@ def _moving(plant: Axis, length: float, group: str, cycle: Cycle, who: Roles, no
 
 
 def _start_states(
-    cycle: Cycle, who: Roles, noise: dict[str, Noise], gaps: NDArray[np.int_], smooth: tuple[Array, Array]
+    cycle: Cycle, who: Roles, noise: dict[str, Noise], gaps: NDArray[np.int_], smoothed: tuple[Array, Array]
 ) -> tuple[Array, Array]:
     """Position and speed from which windows may begin, smoothed no wider than the motion is a local quadratic.
 
     A torque that varies within a few samples, as cogging of a light rotor, bends speed by more than its noise: what
     smoothing takes off it is no deviation that noise makes, and grows in the window.
     """
-    position, speed = smooth
+    position, speed = smoothed
     if who.position is not None:
         x, sigma = cycle[who.position], noise[who.position].rms(speed)
-        position = _smooth(x, gaps, _width(x, gaps, sigma, WIDTHS))
+        position = smooth(x, gaps, _width(x, gaps, sigma, WIDTHS))
         if who.speed is None:
-            speed = _smooth(x, gaps, _width(x, gaps, sigma, tuple(2 * n - 1 for n in WIDTHS)), cycle.period)
+            speed = smooth(x, gaps, _width(x, gaps, sigma, tuple(2 * n - 1 for n in WIDTHS)), cycle.period)
     if who.speed is not None:
         x = cycle[who.speed]
-        speed = _smooth(x, gaps, _width(x, gaps, noise[who.speed].rms(np.gradient(speed, cycle["t"])), WIDTHS))
+        speed = smooth(x, gaps, _width(x, gaps, noise[who.speed].rms(np.gradient(speed, cycle["t"])), WIDTHS))
     return position, speed
 
 
 def _width(x: Array, gaps: NDArray[np.int_], sigma: Array, widths: tuple[int, ...]) -> int:
     """The widest local quadratic that leaves no more than noise in most parts of a cycle, or the narrowest."""
     for width in widths[:-1]:
-        left = (x - _smooth(x, gaps, width)) / np.maximum(sigma, TINY)
+        left = (x - smooth(x, gaps, width)) / np.maximum(sigma, TINY)
         parts = np.array_split(left**2, max(1, len(x) // (4 * width)))
-        of_noise = 1.0 - savgol_coeffs(width, 2)[width // 2]
+        of_noise = 1.0 - left_of_noise(width)
         if np.median([part.mean() for part in parts]) < (1.0 + ESTIMATE_UNCERTAINTY) ** 2 * of_noise:
             return width
     return widths[-1]
-
-
-def _smooth(x: Array, gaps: NDArray[np.int_], width: int, dt: float | None = None) -> Array:
-    """Local quadratics over `width` samples, or with `dt` their slope, each part between gaps by itself."""
-    parts = np.split(x, gaps)
-    if dt is None:
-        return np.concatenate([savgol_filter(p, width, 2) if len(p) >= width else p for p in parts])
-    slope = (savgol_filter(p, width, 2, deriv=1, delta=dt) if len(p) >= width else np.zeros(len(p)) for p in parts)
-    return np.concatenate(list(slope))
 
 
 def speed_noise(who: Roles, noise: dict[str, Noise], period: float) -> float:

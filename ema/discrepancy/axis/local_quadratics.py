@@ -1,0 +1,40 @@
+"""Channels smoothed by local quadratics (Savitzky and Golay), each part between gaps by itself."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_coeffs, savgol_filter
+
+from ema.core.records import Array
+
+
+def smooth(x: Array, gaps: NDArray[np.int_], width: int, dt: float | None = None) -> Array:
+    """Local quadratics over `width` samples, or with `dt` their slope; a part of fewer samples as it is, or level."""
+    parts = np.split(x, gaps)
+    if dt is None:
+        return np.concatenate([savgol_filter(p, width, 2) if len(p) >= width else p for p in parts])
+    slope = (savgol_filter(p, width, 2, deriv=1, delta=dt) if len(p) >= width else np.zeros(len(p)) for p in parts)
+    return np.concatenate(list(slope))
+
+
+def left_of_noise(width: int) -> float:
+    """Share of white noise's variance that a local quadratic leaves in its middle sample.
+
+    It is also what the sample and the smoothed one have in common: their difference has the rest.
+    """
+    return float(savgol_coeffs(width, 2)[width // 2])
+
+
+def smooth_twice(x: Array, once: Array, gaps: NDArray[np.int_], width: int) -> tuple[Array, float]:
+    """`once` and what the same local quadratics still find in the rest: what they take of a slow wave is squared (Tukey).
+
+    Returns
+    -------
+    twice : array, shape (n_times,)
+    left : float
+        Share of white noise's variance that is left in it.
+    """
+    k = savgol_coeffs(width, 2)
+    kernel = 2.0 * np.pad(k, width // 2) - np.convolve(k, k)
+    return once + smooth(x - once, gaps, width), float(kernel @ kernel)
