@@ -24,17 +24,3 @@ def left_of_noise(width: int) -> float:
     It is also what the sample and the smoothed one have in common: their difference has the rest.
     """
     return float(savgol_coeffs(width, 2)[width // 2])
-
-
-def smooth_twice(x: Array, once: Array, gaps: NDArray[np.int_], width: int) -> tuple[Array, float]:
-    """`once` and what the same local quadratics still find in the rest: what they take of a slow wave is squared (Tukey).
-
-    Returns
-    -------
-    twice : array, shape (n_times,)
-    left : float
-        Share of white noise's variance that is left in it.
-    """
-    k = savgol_coeffs(width, 2)
-    kernel = 2.0 * np.pad(k, width // 2) - np.convolve(k, k)
-    return once + smooth(x - once, gaps, width), float(kernel @ kernel)

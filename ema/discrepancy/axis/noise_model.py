@@ -11,7 +11,7 @@ from ema.core.records import Array
 from ema.models.axis_config import Axis
 
 from .pushed import LEAST_R, pushed
-from .whitening import Filter, design, open_loop_variance, variance_without_start
+from .whitening import Filter, Push, design, open_loop_variance, variance_without_start
 from .windows import HALF, START_NOISE, Bench, Window, speed_noise
 
 TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
@@ -28,18 +28,15 @@ class NoiseModel:
         How each output sees a deviation of position and speed.
     noise : array, shape (n_channels, n_times)
         Rms of each output's noise.
-    process : array, shape (n_times,)
-        Rms of the acceleration that the drive's noise makes. [rad/s² or m/s²]
-    damping : float
-        [1/s]
+    push : Push
+        Accelerations by noise: of a known load and of the moment at which friction turns round, and of the drive.
     excursion : two floats
         How far position and speed may start from the truth, generously.
     """
 
     H: Array
     noise: Array
-    process: Array
-    damping: float
+    push: Push
     excursion: tuple[float, float]
 
 
@@ -53,7 +50,7 @@ def position_noise(b: Bench, w: Window) -> float:
 def whitener(p: Axis, b: Bench, w: Window) -> Filter:
     """The filter that makes a window's residual white."""
     m = noise_model(p, b, w)
-    return design(m.H, m.noise, m.process, w.t, m.excursion, m.damping)
+    return design(m.H, m.noise, m.push, m.excursion)
 
 
 def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseModel:
@@ -84,10 +81,11 @@ def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseM
             through = passed / R * drive_noise if kind == "voltage" else 0.0
             noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
     gain, damping = pushed(p, kind)
-    process = np.hypot(gain * drive_noise, b.load_noise / J)
+    process, drive = np.full(w.n, b.load_noise / J), gain * drive_noise
     speed = w.part.speed[w.first : w.first + w.n]  # smoothed no wider than it bends: a stop is at its own sample
     at_rest = np.abs(speed) < 3.0 * START_NOISE * speed_noise(b.roles, b.noise, w.period)
-    process = np.where(at_rest & np.roll(at_rest, 1) & np.roll(at_rest, -1), 0.0, process)
+    held = at_rest & np.roll(at_rest, 1) & np.roll(at_rest, -1)
+    process, drive = np.where(held, 0.0, process), np.where(held, 0.0, drive)
     turns = np.diff(np.where(at_rest, 0.0, np.sign(speed)), prepend=np.sign(speed[0])) != 0.0
     stops = maximum_filter1d(np.abs(acceleration), 2 * HALF + 1)  # at rest there is none: how it came there, or left
     late = START_NOISE * speed_noise(b.roles, b.noise, w.period) / np.maximum(stops, 1e-300)
@@ -100,7 +98,8 @@ def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseM
         0.1 * float(np.ptp(w.position)) + 20.0 * position_noise(b, w),
         0.1 * float(np.ptp(w.speed)) + 20.0 * speed_noise(b.roles, b.noise, w.period),
     )
-    return NoiseModel(np.array(rows), np.array(noise), process, float(damping), excursion)
+    push = Push(np.append(np.diff(w.t), 0.0), damping, process, drive, w.left)
+    return NoiseModel(np.array(rows), np.array(noise), push, excursion)
 
 
 def without_start(p: Axis, b: Bench, w: Window, r: Array) -> tuple[Array, Array]:
@@ -112,10 +111,8 @@ def without_start(p: Axis, b: Bench, w: Window, r: Array) -> tuple[Array, Array]
         of_load = b.load_noise / float(p.k_t or 1.0)
         return r, np.full((1, w.n), b.noise[b.roles.drive].sigma ** 2 + of_load**2)
     m = noise_model(p, b, w, turning=False)
-    H, damping = m.H, m.damping
-    dt = np.append(np.diff(w.t), 0.0)
-    now = np.empty(m.noise.shape)
-    open_loop_variance(H, m.noise, m.process, dt, np.zeros(3), damping, now)
+    H, damping = m.H, m.push.damping
+    now = open_loop_variance(H, m.noise, m.push, np.zeros((2, 2)))
     late = w.t - w.t[0]
     fade = np.exp(-damping * late)
     reach = (1.0 - fade) / damping if damping > 0.0 else late
@@ -126,6 +123,5 @@ def without_start(p: Axis, b: Bench, w: Window, r: Array) -> tuple[Array, Array]
     known = b.roles.position is not None
     A = A if known else A + np.diag([1.0 / position_noise(b, w) ** 2, 0.0])
     estimator = np.ascontiguousarray(np.einsum("ij,cnj,cn->nic", np.linalg.inv(A), modes[:, first], weight))
-    out = np.empty(m.noise.shape)
-    variance_without_start(H, m.noise, m.process, dt, estimator, modes, damping, out)
+    out = variance_without_start(H, m.noise, m.push, estimator, modes)
     return r - modes @ np.einsum("nic,cn->i", estimator, r[:, first]), out
