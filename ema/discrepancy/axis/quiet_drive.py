@@ -32,7 +32,8 @@ def quieten(t: Array, drive: Array, gaps: NDArray[np.int_], noise: Noise) -> tup
     """The smoothed drive, and the share of the noise's variance that is left in it; both of shape (n_times,).
 
     Each sample is smoothed as widely as the intervals that it and the narrower widths give have a value in common
-    (Goldenshluger and Nemirovski; Katkovnik): where the drive jumps, it stays as recorded.
+    (Goldenshluger and Nemirovski; Katkovnik): where the drive jumps, it stays as recorded. Samples that are smoothed
+    unalike do not add up to what they were; what is slow in the rest, as momentum is, is given back.
     """
     quiet, left = drive, np.ones(len(drive))
     if noise.is_bound:  # it has no noise of its own
@@ -48,7 +49,8 @@ def quieten(t: Array, drive: Array, gaps: NDArray[np.int_], noise: Noise) -> tup
         if not agreed.any() or _takes_a_wave(np.where(agreed, (drive - wide) / sigma, 0.0), width):
             break
         quiet, left = np.where(agreed, wide, quiet), np.where(agreed, share, left)
-    return quiet, left
+    slow = smooth(drive - quiet, gaps, WIDTHS[-1], degree=DEGREE)
+    return np.where(left < 1.0, quiet + slow, drive), left
 
 
 def _takes_a_wave(taken: Array, width: int) -> bool:
