@@ -18,13 +18,13 @@ from scipy.stats import norm
 from ema.core.records import Array
 
 from .local_polynomials import left_of_noise, smooth
-from .noise import Noise, disagreement
+from .noise import ESTIMATE_UNCERTAINTY, Noise, disagreement
 
 DEGREE = 4
 WIDTHS = (7, 11, 15, 21, 31, 41, 61)  # samples; wider ones take from waves that a record shows
 AGREE = 1.5  # deviations within which all that are no wider tell a sample
-BIASED = 2.0  # deviations of noise by which what is taken may change a wave of the record
-CHANCE = 0.05  # that noise alone looks like a wave
+BIASED = 4.0  # deviations of noise by which what is taken may change a wave of the record
+CLEAR = 3.0  # deviations by which noise alone may have more
 USUAL = 0.68  # of samples: what disagrees more with its neighbours tells nothing of a cycle's noise
 
 
@@ -54,17 +54,20 @@ def quieten(t: Array, drive: Array, gaps: NDArray[np.int_], noise: Noise) -> tup
 
 
 def _takes_a_wave(taken: Array, width: int) -> bool:
-    """Whether what is taken from the samples, in deviations of their noise, has a wave that noise has not.
+    """Whether what is taken from the samples, in deviations of their noise, has in any octave what noise has not.
 
-    One that is seen in no sample alone stands out over a record: the ripple of a current that holds against cogging. Of
-    noise a width takes (1 - K)² of each wave's power, K its gain.
+    A wave that is seen in no sample alone stands out over a record, the ripple of a current that holds against cogging
+    at a speed that varies too. Of noise a width takes (1 - K)² of each wave's power, K its gain.
     """
     n = len(taken)
     power = np.abs(np.fft.rfft(taken)) ** 2 / n
     kernel = np.zeros(n)
     kernel[np.arange(width) - width // 2] = savgol_coeffs(width, DEGREE)
-    of_noise = (1.0 - np.fft.rfft(kernel).real) ** 2 * np.log(len(power) / CHANCE)
-    return bool((power > of_noise + BIASED**2).any())
+    of_noise = (1.0 - np.fft.rfft(kernel).real) ** 2
+    octaves = 2 ** np.arange(int(np.log2(len(power))) + 1) - 1
+    more = np.add.reduceat(power - (1.0 + ESTIMATE_UNCERTAINTY) ** 2 * of_noise, octaves)
+    by_chance = CLEAR * np.sqrt(np.add.reduceat(of_noise**2, octaves))
+    return bool((more > BIASED**2 + by_chance).any())
 
 
 def _of_cycle(t: Array, drive: Array, noise: Noise) -> float:
