@@ -12,9 +12,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ema.discrepancy import findings as shared
 from ema.discrepancy.grade import NAMED
 from ema.discrepancy.plant import Point
+from ema.effects.position_line import EFFECT as POSITION_LINE
 
 from .balance.as_effects import effects
 from .balance.found import Balance, Term
@@ -38,7 +41,7 @@ def merge(
     for term in b.terms if b is not None else ():
         assert b is not None
         name = name_law(b, term)
-        own = [k for k, e in enumerate(out) if e.name == name and _is_same(e, effects(b, term)[name])]
+        own = [k for k, e in enumerate(out) if e.name == name and _is_same(e, effects(b, term)[name], b.travel)]
         for k in own:
             out[k] = _with_pairs(out[k], b, term)
             if out[k].indistinguishable_from or verdict == "partly explained":
@@ -71,7 +74,10 @@ def _limit(term: Term, share: float) -> Term:
     return replace(term, wins=share * term.wins, alike={name: share * wins for name, wins in term.alike.items()})
 
 
-def _is_same(e: shared.FoundEffect, values: dict[str, float]) -> bool:
-    """Of cogging, the same line."""
+def _is_same(e: shared.FoundEffect, values: dict[str, float], travel: float) -> bool:
+    """Of a line, the same: orders of a turn are whole, along a travel those that a period of it tells apart are two."""
     order = e.parameters.get("order")
-    return order is None or round(order.value) == round(values.get("order", order.value))
+    if order is None:
+        return True
+    apart = 2.0 * np.pi / travel if e.name == POSITION_LINE.name else 0.5
+    return abs(order.value - values.get("order", order.value)) < apart

@@ -10,6 +10,7 @@ import yaml
 
 from ema.discrepancy.axis import wording
 from ema.discrepancy.axis.between import examine_ways
+from ema.discrepancy.axis.named_laws import name_laws
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.extended import write_extended
 from ema.effects import registry
@@ -46,6 +47,18 @@ def test_the_magnets_of_a_linear_motor_are_named_with_their_pitch(positioner, tm
     plant_file.write_text(yaml.safe_dump(positioner.table_plant(bench)), encoding="utf-8")
     write_extended(plant_file, found.effects, out)
     assert set(axis_config.load(out).effects) == {"position_line", "position_line#2"}
+
+
+def test_a_pitch_by_the_balance_alone_has_an_interval_and_is_no_step_of_a_grid(positioner):
+    """A line stands for those between it and the next: its order had been a multiple of a step, surely."""
+    bench = positioner.Table(magnets=MAGNETS[:1])
+    plant = AxisPlant(LinearAxis.model_validate(positioner.table_plant(bench)), [positioner.table(bench, 11)])
+    b = plant.balance
+    assert b is not None
+    lines = [e for e in name_laws(plant, b, b.terms) if e.name == "position_line"]
+    q = max(lines, key=lambda e: e.parameters["amplitude"].value).parameters["order"]
+    assert q.low < q.value < q.high
+    assert q.value == pytest.approx(2.0 * np.pi / MAGNETS[0][1], rel=0.003)
 
 
 def test_a_table_without_magnets_has_no_line_along_its_travel(positioner):

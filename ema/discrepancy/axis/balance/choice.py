@@ -20,7 +20,7 @@ from .rows import Rows
 MOST_LAWS = 8  # a series of lines is one
 MOST_LINES = 16  # of one series: each takes a tenth at least of what those before it left
 SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
-N_FINER = 5  # times that the step between members of a family is halved
+N_FINER = 9  # times that the step between members of a family is halved
 N_DRAWS = 400  # of blocks, to see how often a law wins
 N_NEAR = 16  # members of a family that are asked how often each leaves least
 EQUAL = 1e-9  # share by which rounding tells two columns apart that are one on these records: the first is taken
@@ -225,9 +225,16 @@ def _term(found: Rows, plain: Plain, model: Regression, law: Law, every: Sequenc
 def _near_members(
     found: Rows, plain: Plain, model: Regression, without: Regression, law: Law, every: Sequence[Law]
 ) -> tuple[tuple[Regression, float], ...]:
-    """Fits with another member of a law's family in its place, and how often each leaves least."""
-    same = [own for own in every if own.family == law.family and own.name == law.name and own.key != law.key]
-    if not same or law.family in LINES:
+    """Fits with another member of a law's family in its place, and how often each leaves least.
+
+    Where members stand for all between them, those that lie between this one and the next too.
+    """
+    if law.family in LINES and law.finer is None:
+        return ()
+    same = [own for own in every if own.family == law.family and own.name == law.name]
+    same += [own for k in range(1, N_FINER + 1) if law.finer is not None for own in law.finer(0.5**k)]
+    same = [own for own in same if own.key != law.key]
+    if not same:
         return ()
     near = np.argsort(-_gains(found, without, same))[:N_NEAR]
     fits = {same[k].key: regress(found, plain, _add(without, same[k])) for k in near}
