@@ -37,9 +37,10 @@ def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Se
                 continue
             said = _said(plant)
             unit = units_of(effect, said)
+            same = [there for s in samples if (there := own.like(key, s)) is not None]
             parameters = {}
             for name, value in values.items():
-                spread = [s.effects[key][name] for s in samples if key in s.effects]
+                spread = [there[name] for there in same]
                 low, high = interval(name, value, spread or [value])
                 parameters[name] = {"value": value, "low": low, "high": high, "unit": unit[name]}
             entry = {

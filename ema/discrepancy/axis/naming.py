@@ -28,12 +28,18 @@ PARAMETERS = ("J", "M", "C", "F_d", "k_t", "k_e", "R", "L")
 
 @dataclass(frozen=True)
 class Numbers:
-    """A point, sorted."""
+    """A point, sorted. `lines` has the key of each line among the effects by its name there, as ``cogging:72``."""
 
     parameters: dict[str, float]
     effects: dict[str, dict[str, float]]
     terms: list[dict[str, float]]
     zeros: dict[str, float]
+    lines: dict[str, str]
+
+    def like(self, key: str, other: Numbers) -> dict[str, float] | None:
+        """What another point has of an effect of this one: of a line, that of the same name, whatever its number."""
+        name = next((name for name, own in self.lines.items() if own == key), None)
+        return other.effects.get(key if name is None else other.lines.get(name, ""))
 
 
 def line(order: float, part: str, effect: str = "cogging") -> str:
@@ -61,11 +67,13 @@ def numbers_of(point: Point) -> Numbers:
             effects.setdefault(head, {})[tail] = value
         else:
             parameters[name] = value
+    keys: dict[str, str] = {}
     for (effect, order), parts in sorted(lines.items()):
         number = 1 + sum(key.split(INSTANCE)[0] == effect for key in effects)
         key = effect if number == 1 else f"{effect}{INSTANCE}{number}"
         effects[key] = torque_line(parts.get("order", order), parts.get("cos", 0.0), parts.get("sin", 0.0))
-    return Numbers(parameters, effects, list(terms.values()), zeros)
+        keys[f"{effect}:{order:.8g}"] = key
+    return Numbers(parameters, effects, list(terms.values()), zeros, keys)
 
 
 def torque_line(order: float, cos: float, sin: float) -> dict[str, float]:

@@ -33,6 +33,16 @@ def test_lines_of_torque_are_numbered_and_act_as_their_cosine_and_sine():
     assert said == pytest.approx(0.3 * np.cos(72.0 * theta) - 0.4 * np.sin(72.0 * theta))
 
 
+def test_a_line_is_found_again_beside_others():
+    """Drawn from sets with other lines, order 72 had an interval that began at 71."""
+    own = numbers_of({line(72.0, "cos"): 0.3, line(6.0, "sin"): 1.0, "stribeck.speed": 3.0})
+    other = numbers_of({line(n, "cos"): 0.1 * n for n in (5.0, 6.0, 71.0, 72.0)} | {"stribeck.speed": 4.0})
+    assert own.like("cogging#2", other) == pytest.approx(torque_line(72.0, 7.2, 0.0))
+    assert own.like("cogging", other) == pytest.approx(torque_line(6.0, 0.6, 0.0))
+    assert own.like("stribeck", other) == {"speed": 4.0}
+    assert own.like("cogging#2", numbers_of({line(6.0, "sin"): 1.0})) is None
+
+
 def test_amplitude_and_phase_are_those_of_the_parts():
     assert torque_line(5.0, 0.0, 2.0) == pytest.approx({"amplitude": 2.0, "order": 5.0, "phase": 0.0})
 
