@@ -198,9 +198,7 @@ def _moving(plant: Axis, length: float, group: str, cycle: Cycle, who: Roles, no
     cuts = _glitches(cycle, who, noise) if who.position is not None and who.speed is not None else np.array([], int)
     margin = HALF if who.speed is not None else 2 * HALF  # over which the smoothed speed mixes rest with motion
     of_drive = pushed(plant, who.kind)[0] * noise[who.drive].rms(np.gradient(cycle[who.drive], t))
-    jolted = (
-        of_drive * dt * np.sqrt(2 * margin + 1)
-    )  # one deviation of what the drive's noise makes: no motion to begin from
+    jolted = of_drive * dt * np.sqrt(2 * margin + 1)  # one deviation of what its noise makes of a speed meanwhile
     still = np.abs(speed) < np.hypot(AT_REST * START_NOISE * speed_noise(who, noise, dt), jolted)
     rests = _rests(still | _reversals(speed), margin)
     turns = np.flatnonzero(np.diff(np.sign(speed)) != 0.0) + 1
