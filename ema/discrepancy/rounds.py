@@ -215,10 +215,10 @@ def revise(plant: Plant, state: State, progress: Progress) -> None:
 def drop_unneeded(plant: Plant, state: State, progress: Progress) -> None:
     """Leave out, the weakest first, what is not worth it beside the others; note what each that stays is worth."""
     while n := len(state.model.accepted):
-        without = [state.plain]
-        if n > 1:
-            progress(f"without each of {n}")
-            without = [leave_out(plant, state.model, {k}) for k in range(n)]
+        progress(f"without {'each of ' if n > 1 else ''}{n}")
+        without = [leave_out(plant, state.model, {k}) for k in range(n)]
+        if n == 1:
+            state.plain = without[0] = _likelier(without[0], state.plain)
         gains = {
             k: compare(state.model, reduced).gain
             for k, reduced in enumerate(without)
@@ -230,6 +230,11 @@ def drop_unneeded(plant: Plant, state: State, progress: Progress) -> None:
         weakest = min(gains, key=lambda k: gains[k])
         state.model = without[weakest]
         del state.rounds[weakest]
+
+
+def _likelier(one: Tried, other: Tried) -> Tried:
+    """Of two fits of one model that under which held-out parts are likelier: dry friction has side minima."""
+    return one if compare(one, other).gain > 0.0 else other
 
 
 def leave_out(plant: Plant, model: Tried, out: set[int]) -> Tried:

@@ -13,7 +13,7 @@ from .fitting import WILD, Fit
 from .grade import NAMED
 from .plant import Array, Candidate, Free, Plant
 from .progress import Progress
-from .rounds import State, is_explained, judge_model, leave_out
+from .rounds import State, drop_unneeded, is_explained, judge_model, leave_out
 from .selection import FORM, Tried, above_noise, compare
 from .weighing import Weighed, weigh_sets
 
@@ -44,8 +44,7 @@ def drop_unlikely(plant: Plant, state: State, progress: Progress) -> tuple[dict[
         state.unlikely.append(_unlikely(worst, odds[worst], without, state.model))
         state.model = without
         del state.rounds[k]
-        for j, (trials, _) in enumerate(state.rounds):
-            state.rounds[j] = trials, leave_out(plant, without, {j})
+        drop_unneeded(plant, state, progress)
 
 
 def describe_effects(
