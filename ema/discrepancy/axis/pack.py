@@ -27,7 +27,7 @@ class LedIn:
     t: Array
     drive: Array
     load: Array
-    own: NDArray[np.bool_] | slice
+    own: NDArray[np.bool_]
 
     @classmethod
     def of(cls, windows: list[Window], n: int) -> LedIn:
@@ -55,16 +55,20 @@ class Pack:
         directions = [w.direction for w in windows if w.direction is not None]
         self.direction = np.concatenate(directions) if directions else None
         self.filter = join(filters) if filters else None
-        bare = LedIn(0, self.offsets, self.t, self.drive, self.load, slice(None))
-        self._led_in = {0: bare}  # and the last other one asked for
+        self._led_in: dict[int, LedIn] = {}  # the first and the last other one asked for
         self._histories: dict[tuple[float, int], History] = {}  # the last one asked for
         self._acting: dict[tuple[float, str], dict[int, Array]] = {}  # the same
 
-    def led_in(self, late: float) -> LedIn:
-        """The windows, each with the motion before it that a sensor shows in it which is `late`. [s]"""
-        n = math.ceil(late / self.windows[0].period - 1e-9)
+    def led_in(self, back: float) -> LedIn:
+        """The windows with the motion before each that acts in it still, `back` at the most. [s]
+
+        That is what a late sensor shows, and the voltage that made its current. One sample at least: so a delay of next
+        to nothing begins where none does.
+        """
+        n = math.floor(back / self.windows[0].period + 1e-9) + 1
         if n not in self._led_in:
-            self._led_in = {0: self._led_in[0], n: LedIn.of(self.windows, n)}
+            first = dict(list(self._led_in.items())[:1])
+            self._led_in = {**first, n: LedIn.of(self.windows, n)}
         return self._led_in[n]
 
     def drive_by(self, model: axis.Model, led_in: LedIn, between: str) -> Array:

@@ -36,6 +36,7 @@ from .zeros import zeros
 
 NOISE = 3.0  # deviations of the position's noise that are no way
 RUNAWAY = 1e6  # a window that runs away counts as no worse than this
+SETTLED = 5.0  # time constants of a winding, by which 0.7 % is left of a current's beginning
 H_MAX = 2.5e-4  # [s] longest step of the simulation, unless the record's own period is longer than ten of them
 
 
@@ -217,7 +218,7 @@ class AxisPlant:
         if pack.direction is not None:
             return axis.holding(model, pack.position + zero, pack.direction, pack.t, pack.load)[None, :]
         step = self._step(pack)
-        led_in = pack.led_in(max(_late(model)))
+        led_in = pack.led_in(max(_late(model)) + (self._settling if pack.bench.roles.kind == "voltage" else 0.0))
         starts = self._starts(pack, model, step, led_in.n)
         starts[:, 0] += zero
         drive = pack.bench.roles.kind
@@ -227,6 +228,11 @@ class AxisPlant:
         out = out[:, led_in.own]
         out[0] -= zero
         return out[[_KERNEL_ROW[name] for name in pack.bench.roles.outputs]]
+
+    @property
+    def _settling(self) -> float:
+        """How long a current shows how it began, where only its voltage is recorded. [s]"""
+        return SETTLED * float(self.plant.L or 0.0) / float(self.plant.R) if self.plant.R else 0.0
 
     def free_run(self, point: Point, blocks: Sequence[int]) -> list[Array]:
         """Record less simulation, shape (n_channels, n_times) by block."""

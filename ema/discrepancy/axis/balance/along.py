@@ -161,19 +161,20 @@ def _stiffening(centre: float, half: float, growth: float, u: Units) -> Law:
 def _any(centre: float, half: float, u: Units) -> Law:
     """Whatever a torque does along the travel, as Chebyshev's polynomials: it has no name."""
 
-    def columns(m: Motion, _: Acting) -> tuple[Array, ...]:
-        return tuple(chebvander((m.theta - centre) / half, N_POLYNOMIALS - 1).T)
+    def polynomials(n: int) -> Columns:
+        return lambda m, _: tuple(chebvander((m.theta - centre) / half, n - 1).T)
 
     return Law(
         ANY,
         ANY,
         "position_torque",
-        columns,
+        polynomials(N_POLYNOMIALS),
         {"size": u.torque},
         lambda c: {"size": float(np.linalg.norm(c[1:]))},
         f"a {u.said} that is a function of the position, {{size:.3g}} {u.torque}, of no form that has a name",
         "slow motion over the whole travel, and the same with what hangs or pulls at the axis taken off",
         n_columns=N_POLYNOMIALS,
+        freer=polynomials(2 * N_POLYNOMIALS),
     )
 
 

@@ -59,6 +59,8 @@ class Law:
         The law of which it has the columns once for each record.
     finer : function share → laws
         Of a family whose members stand for all between them: those that lie this share of a step to both sides.
+    freer : function (motion, acting) → arrays of shape (n_samples,)
+        Of what has no name, and so no form: columns of the same with twice the freedom.
     """
 
     family: str
@@ -76,6 +78,7 @@ class Law:
     repeats: Law | None = None
     weak: Callable[[Motion], Sequence[tuple[Array, Array]]] | None = None
     finer: Callable[[float], Sequence[Law]] | None = None
+    freer: Columns | None = None
 
 
 def one(name: str, **shape: float) -> Values:
