@@ -12,7 +12,7 @@ from .fitting import Fit, fit, jacobian
 from .grade import Left, grade
 from .held_out import by_record, over_folds, residual_over_folds, training_errors
 from .outcome import Outcome
-from .plant import Plant
+from .plant import FORM, Plant
 from .progress import Progress
 from .rounds import (
     Reread,
@@ -26,7 +26,7 @@ from .rounds import (
     try_library_alone,
     try_together,
 )
-from .selection import FORM, above_noise, compare, fit_base, is_nameless
+from .selection import above_noise, compare, fit_base, is_nameless
 from .trust import describe_effects, drop_unlikely
 from .weighing import Weighed
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .grade import LIMIT
-from .plant import Candidate, Plant, Point
+from .plant import FORM, Candidate, Plant, Point
 from .progress import Progress
 from .selection import (
-    FORM,
     N_FOLDS,
     Tried,
     above_noise,

@@ -25,7 +25,6 @@ SEED = 20
 FEW_PARTS, MAX_LOSS = 4, 0.05  # parts that must gain more than `ODDS`, and losses elsewhere over all gains
 MIN_SHARE = 0.02  # of the residual above noise that a further effect must explain
 MIN_SHARE_OF_TERM = 0.05
-FORM = 0.17  # what the laws of the library are off by, relative: a Lorentzian for an exponential Stribeck curve, say
 SAME_SHARE = 0.03  # explanations of a residual that none explains fully are alike within this share of the gain
 
 

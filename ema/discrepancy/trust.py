@@ -11,10 +11,10 @@ from scipy.stats import norm
 from .findings import reject
 from .fitting import WILD, Fit
 from .grade import NAMED
-from .plant import Array, Candidate, Free, Plant
+from .plant import FORM, Array, Candidate, Free, Plant
 from .progress import Progress
 from .rounds import State, drop_unneeded, is_explained, judge_model, leave_out
-from .selection import FORM, Tried, above_noise, compare
+from .selection import Tried, above_noise, compare
 from .weighing import Weighed, weigh_sets
 
 

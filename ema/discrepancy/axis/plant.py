@@ -126,7 +126,7 @@ class AxisPlant:
     def seen_together(self, point: Point) -> list[Candidate]:
         """Effects that the balance of torque needs beside each other, begun where it has them."""
         library = {c.key: c for c in candidates.library(self, point, range(len(self.blocks)))}
-        return begin_with_balance(self.balance, library)
+        return begin_with_balance(self.balance, self.plant, library)
 
     def structure(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Terms that the torque residual along the measured motion suggests."""

@@ -17,7 +17,7 @@ from ema.effects import registry
 from ema.effects.position_line import EFFECT as POSITION_LINE
 from ema.models.axis_config import LINES, Axis
 
-from .balance.as_effects import effects, errors, find_alternatives, line_point
+from .balance.as_effects import effects, errors, find_alternatives, line_point, of_base
 from .balance.found import Balance
 from .candidates import PRIOR
 from .naming import line
@@ -37,6 +37,7 @@ ROOM = 10.0  # times the size that the regression found, to which a fit may go
 FIXED = (  # parameters that the records of one bench hardly show
     *("turns", "centre", "half", "over", "since", "damping", "shape"),
 )
+FITTED = {"inertia": {"J", "M"}, "viscous_drag": {"C"}}  # what a fit changes in their place
 VAGUE = ("viscous_by_temperature.coefficient",)  # shown where records are warm enough to bend the law: else a prior
 
 
@@ -57,14 +58,19 @@ def suggest_by_balance(balance: Balance | None, plant: Axis, point: Point) -> li
     return out
 
 
-def begin_with_balance(balance: Balance | None, library: Mapping[str, Candidate]) -> list[Candidate]:
+def begin_with_balance(balance: Balance | None, plant: Axis, library: Mapping[str, Candidate]) -> list[Candidate]:
     """Every law that the balance needs, begun there; with the library's own freedom where it has that effect.
 
-    But lines of torque, of which a search finds each in what the others leave.
+    First an inertia and a drag that are not the plant file's, where that has them as known; but no lines of torque, of
+    which a search finds each in what the others leave.
     """
     if balance is None:
         return []
-    out: dict[str, Candidate] = {}
+    out = {
+        name: _start(library[name], {f"{name}.{p}": value for p, value in values.items()})
+        for name, values in of_base(balance).items()
+        if name in library and not FITTED[name] & set(plant.fitted)
+    }
     for term in balance.terms:
         unsure = errors(balance, term)
         for name, values in effects(balance, term).items():
@@ -73,11 +79,14 @@ def begin_with_balance(balance: Balance | None, library: Mapping[str, Candidate]
             law = begin_at(name, values, unsure.get(name, {}), balance.travel)
             own = library.get(law.key)
             if own is not None:
-                known = {f"{name}.{p}": value for p, value in values.items()}
-                start = {f.name: min(max(known.get(f.name, f.start), f.low), f.high) for f in own.free}
-                law = replace(own, starts=(start,))
+                law = _start(own, {f"{name}.{p}": value for p, value in values.items()})
             out.setdefault(law.key, law)
     return [*out.values()]
+
+
+def _start(own: Candidate, known: Mapping[str, float]) -> Candidate:
+    """The library's candidate, begun where values are known."""
+    return replace(own, starts=({f.name: min(max(known.get(f.name, f.start), f.low), f.high) for f in own.free},))
 
 
 def begin_at(name: str, values: dict[str, float], unsure: dict[str, float], travel: float) -> Candidate:

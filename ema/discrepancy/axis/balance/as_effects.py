@@ -16,6 +16,7 @@ from ema.models.axis_config import LINES
 from .found import Balance, Term, draw_law
 from .law import Law
 
+CLEAR = 3.0  # standard deviations by which the plant file is off
 Effects = dict[str, dict[str, float]]
 Values = Mapping[str, float]
 
@@ -23,6 +24,23 @@ Values = Mapping[str, float]
 def effects(b: Balance, term: Term) -> Effects:
     """Effects with their parameters; empty where the library has none that acts like this law."""
     return _of_law(b, term.law, b.corrected.coefficients[b.model.part(term.law)])
+
+
+def of_base(b: Balance) -> Effects:
+    """Inertia and drag that are clearly others than the plant file's, as effects beside it."""
+    fitted = dict(zip(b.model.base, b.corrected.coefficients, strict=False))
+    sd = dict(zip(b.model.base, np.sqrt(np.diag(b.corrected.covariance)), strict=False))
+    more = {
+        "inertia": fitted.get("inertia", b.plain.inertia) - b.plain.inertia,
+        "viscous_drag": fitted.get("viscous_drag", 0.0),
+    }
+    clear = {name: float(x) for name, x in more.items() if name in sd and abs(x) > CLEAR * sd[name]}
+    out: Effects = {}
+    if "viscous_drag" in clear:
+        out["viscous_drag"] = {"coefficient": clear["viscous_drag"]}
+    if "inertia" in clear and b.plain.inertia > 0.0:
+        out["inertia"] = {"change": clear["inertia"] / b.plain.inertia}
+    return out
 
 
 def errors(b: Balance, term: Term) -> Effects:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.records import Array
-from ema.discrepancy.selection import FORM
+from ema.discrepancy.plant import FORM
 
 from .law import BY_RECORD
 
