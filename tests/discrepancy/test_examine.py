@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from ema.discrepancy.fitting import best_fit, fit, jacobian
 from ema.discrepancy.held_out import by_record, over_folds, residual_over_folds, training_errors
 from ema.discrepancy.plant import Block, Candidate, Errors, Free
 from ema.discrepancy.progress import Progress
-from ema.discrepancy.rounds import State, leave_out, select
+from ema.discrepancy.rounds import State, drop_unneeded, leave_out, select
 from ema.discrepancy.selection import fit_base, fit_with_each, split_into_folds
 from ema.discrepancy.trust import at_bound, describe_effects, drop_unlikely
 from ema.discrepancy.verdict import correlation_test, judge, scale_test
@@ -249,3 +250,14 @@ def test_of_three_effects_the_first_may_gain_no_more_than_chance_by_itself(seed)
     found = examine(toy)
     assert {e["name"] for e in found.effects} == {"a", "b", "c"}
     assert found.verdict in ("explained", "partly explained")
+
+
+def test_an_effect_that_only_moved_the_base_out_of_a_side_minimum_goes():
+    """The fit without effects had stopped in one; left out again, the effect is worth nothing."""
+    toy = Toy(6, ("a",), k=0.6)
+    stuck = replace(fit_base(toy), held_out=tuple(toy.residuals([{"k": 0.0}], range(N_BLOCKS))[0]))
+    beside = fit_with_each(toy, stuck, toy.candidates, str)["a"]
+    state = State(stuck, beside, [({"a": beside}, stuck)], [])
+    drop_unneeded(toy, state, Progress())
+    assert state.model.accepted == ()
+    assert state.plain.rms == pytest.approx(1.0, abs=0.1)

@@ -7,6 +7,8 @@ import on_paper
 import pytest
 
 from ema.core.records import Cycle
+from ema.discrepancy.axis.plant import AxisPlant
+from ema.models.axis_config import RotaryAxis
 
 SWING = on_paper.Swing(((2.5, 2.3, 0.3), (0.04, 80.0, 1.1)))  # a jerk that no constant acceleration follows
 LATE = 3.4e-3
@@ -42,3 +44,17 @@ def test_a_window_is_led_in_no_further_than_the_axis_moved_as_in_it():
         assert (t[-w.n :] == w.t).all()
         lead = w.part.speed[w.begin(50) : w.first]
         assert (np.sign(lead) == np.sign(w.speed[0])).all()
+
+
+def test_a_delay_of_next_to_nothing_leaves_what_none_does(support):
+    """A current of which only the voltage is recorded shows how it began: windows begin before that shows."""
+    other = support("axis_other")
+    setup = other.SETUPS["voltage"]
+    plant = AxisPlant(RotaryAxis.model_validate(other.plant(setup)), [other.record(setup, 5)])
+    everything = range(len(plant.blocks))
+    at = {f.name: f.start for f in plant.base}
+    left = [
+        sum(float(np.sum(r**2)) for r in plant.whitened({**at, "speed_delay.time": late}, everything))
+        for late in (0.0, 1e-9)
+    ]
+    assert left[1] == pytest.approx(left[0], abs=1.0)

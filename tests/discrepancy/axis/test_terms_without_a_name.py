@@ -10,6 +10,7 @@ import pytest
 
 from ema.core.records import Cycle
 from ema.discrepancy.axis.describe import structure as said
+from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.axis.structure import search
 from ema.models.axis_config import LinearAxis, RotaryAxis
 
@@ -123,3 +124,14 @@ def test_a_line_is_said_by_its_order_and_on_a_linear_axis_by_its_length():
     whole = said(ROTARY, [term], point | {"term1.order": 5.0})
     assert "no whole number" not in whole["terms"][0]["sentence"]
     assert said(ROTARY, [], {}) == {"terms": [], "orders": [], "frequencies": [], "depends_on": []}
+
+
+@pytest.mark.parametrize("seed", [5, 6, 7])
+def test_what_bends_a_torque_without_a_name_is_no_cause_of_its_own(support, seed):
+    """A cushion of two slopes has no law here; a pendulum that takes what ten polynomials leave of it is its form."""
+    strange = support("strange")
+    axis = strange.Axis()
+    plant = AxisPlant(RotaryAxis.model_validate(strange.plant(axis)), [strange.record("cushion", axis, seed)])
+    found = plant.balance
+    sure = {term.law.name for term in found.terms if found.of_set(term) >= 0.5}
+    assert sure <= {"position_torque", "spring_load", "stiffening_spring"}
