@@ -49,11 +49,11 @@ def table(rows: Sequence[Row]) -> str:
     seen = [row for row in rows if row["outcome"] != "refused"]
     parts = [
         f"Commit `{commit[:9]}`, {len(rows)} trials, {len(rows) - len(seen)} of them refused.",
-        _markdown(("what", "measured", "aim"), _aims(seen)),
+        markdown(("what", "measured", "aim"), _aims(seen)),
         "Calibration: of answers with a stated probability P, how many hold a true cause.",
-        _markdown(("P", "stated on average", "right"), reliability(_answers(seen))),
+        markdown(("P", "stated on average", "right"), reliability(_answers(seen))),
         *_posterior(seen),
-        _markdown(("stratum", "right, or in a set", "confidently wrong", "refused"), _strata(rows)),
+        markdown(("stratum", "right, or in a set", "confidently wrong", "refused"), _strata(rows)),
     ]
     return "\n\n".join(parts)
 
@@ -66,10 +66,11 @@ def beside(rows: Sequence[Row], others: Sequence[Row]) -> str:
     ends = [[row for row in (of[key] for key in both) if row["outcome"] != "refused"] for of in (own, other)]
     lines = [(what, old, new) for (what, new, _), (_, old, _) in zip(*map(_aims, ends), strict=True)]
     head = f"The {len(both)} trials that {' and '.join(commits)} have in common, with what is refused left out."
-    return f"{head}\n\n{_markdown(('what', commits[1], commits[0]), lines)}"
+    return f"{head}\n\n{markdown(('what', commits[1], commits[0]), lines)}"
 
 
-def _markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
@@ -121,7 +122,7 @@ def _posterior(rows: Sequence[Row]) -> list[str]:
     answers = [(float(first["probability"]), set(first["effects"]) == truth(row)) for first, row in firsts]
     return [
         "The same of the first set of the posterior: exactly the hidden effects, none more.",
-        _markdown(("P", "stated on average", "right"), reliability(answers)),
+        markdown(("P", "stated on average", "right"), reliability(answers)),
     ]
 
 

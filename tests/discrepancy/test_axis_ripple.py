@@ -7,7 +7,7 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.ripple import describe, find_ripples
+from ema.discrepancy.axis.ripple import describe, find_ripples, structure
 from ema.models.axis_config import RotaryAxis
 
 SPEED, NOISE = 28.4, 0.1
@@ -51,3 +51,12 @@ def test_causes_stand_beside_each_other_and_what_tells_them_apart():
     assert "order 6" in text
     assert "encoder that errs by 0.0011 rad" in text
     assert "several constant voltages" in text
+
+
+def test_ripple_is_structure_of_what_is_left():
+    plant_file = {"kind": "axis", "drive": "voltage", "J": 1e-5, "F_d": 1e-3, "k_t": 0.03, "k_e": 0.03, "R": 1.0}
+    axis = RotaryAxis.model_validate(plant_file)
+    found = structure(AxisPlant(axis, [Record((cycle([(0.19, 6, 0.3), (0.06, 1, 1.0)]),))]))
+    assert [row["order"] for row in found["ripple"]] == [6, 1]
+    assert "ripples at orders 6, 1 per turn" in found["sentences"][0]
+    assert structure(AxisPlant(axis, [Record((cycle(),))])) == {}

@@ -9,8 +9,8 @@ At one speed one is as good as the other.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -71,25 +71,41 @@ def _lines(theta: Array, w: Array, highest: int) -> Array:
     return np.asarray(x[: 2 * highest : 2] - 1j * x[1 : 2 * highest : 2])
 
 
-def describe(plant: AxisPlant) -> Iterator[str]:
-    """A sentence for each record under a constant voltage whose speed ripples."""
+def list_ripples(plant: AxisPlant) -> dict[str, list[Ripple]]:
+    """The lines of each record under one voltage whose speed ripples, by the record's name."""
     if plant.plant.is_linear:
-        return
-    for bench, record in zip(plant.benches, plant.records, strict=True):
-        found = [
+        return {}
+    found = {
+        bench.name: [
             one
             for cycle in record
             if bench.roles.kind == "voltage" and {"theta_m", "w_m"} <= set(cycle.channels) and _is_one_voltage(cycle)
             for one in find_ripples(cycle)
-        ]
-        if found:
-            lines = "; ".join(_line(plant, one) for one in found[:MOST])
-            yield (
-                f"{bench.name}: at {found[0].speed:.4g} rad/s the speed ripples: {lines}; each may also be a "
-                "back-EMF that is no sine, and one speed under one voltage does not tell which: record several "
-                "constant voltages (a torque keeps its size in N m, an encoder's error in rad, what a back-EMF makes "
-                "grows with the speed) and the phase currents"
-            )
+        ][:MOST]
+        for bench, record in zip(plant.benches, plant.records, strict=True)
+    }
+    return {name: lines for name, lines in found.items() if lines}
+
+
+def structure(plant: AxisPlant) -> dict[str, Any]:
+    """What of it is structure of the rest: rows with the two readings of each line, and a sentence a record."""
+    found = list_ripples(plant)
+    rows = [_row(plant, name, one) for name, lines in found.items() for one in lines]
+    orders = {name: ", ".join(f"{one.order}" for one in lines) for name, lines in found.items()}
+    said = [f"{name}: the speed ripples at orders {orders[name]} per turn" for name in found]
+    return {"ripple": rows, "sentences": said} if rows else {}
+
+
+def describe(plant: AxisPlant) -> Iterator[str]:
+    """A sentence for each record, with what may make the lines and what would tell."""
+    for name, lines in list_ripples(plant).items():
+        yield (
+            f"{name}: at {lines[0].speed:.4g} rad/s the speed ripples: "
+            f"{'; '.join(_said(_row(plant, name, one)) for one in lines)}; each may also be a "
+            "back-EMF that is no sine, and one speed under one voltage does not tell which: record several "
+            "constant voltages (a torque keeps its size in N m, an encoder's error in rad, what a back-EMF makes "
+            "grows with the speed) and the phase currents"
+        )
 
 
 def _is_one_voltage(cycle: Cycle) -> bool:
@@ -97,12 +113,20 @@ def _is_one_voltage(cycle: Cycle) -> bool:
     return len(np.unique(cycle["u_q"][cycle["u_q"] != 0.0])) == 1
 
 
-def _line(plant: AxisPlant, one: Ripple) -> str:
+def _row(plant: AxisPlant, record: str, one: Ripple) -> dict[str, Any]:
+    """A line, the torque [N m] and the encoder's error [rad] that would make it."""
     p, n = plant.plant, one.order
     braking = float(p.k_t or 0.0) * float(p.k_e or 0.0) / float(p.R) if p.R else 0.0
-    torque = abs(p.inertia * 1j * n * one.speed + p.C + braking) * one.amplitude
-    angle = one.amplitude / (n * one.speed)
+    return {
+        "record": record,
+        **asdict(one),
+        "torque": abs(p.inertia * 1j * n * one.speed + p.C + braking) * one.amplitude,
+        "encoder": one.amplitude / (n * one.speed),
+    }
+
+
+def _said(row: dict[str, Any]) -> str:
     return (
-        f"order {n} by {one.amplitude:.3g} rad/s, as by a torque of {torque:.3g} N m at "
-        f"the plant file's inertia (cogging) or an encoder that errs by {angle:.2g} rad"
+        f"order {row['order']} by {row['amplitude']:.3g} rad/s, as by a torque of {row['torque']:.3g} N m at "
+        f"the plant file's inertia (cogging) or an encoder that errs by {row['encoder']:.2g} rad"
     )

@@ -70,6 +70,8 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     if structure:
         structure["sentences"] = [term["sentence"] for term in structure.get("terms", ())]
         structure["sentences"] += [structure["event"]] if "event" in structure else []
+    if rippled := ripple.structure(plant):
+        structure |= {**rippled, "sentences": [*structure.get("sentences", []), *rippled["sentences"]]}
     notes = [*outcome.notes]
     if outcome.verdict != "adequate":
         notes.append(f"the nominal model is refuted: {outcome.because} (p = {outcome.p_value:.1g})")
