@@ -12,14 +12,14 @@ from __future__ import annotations
 import hashlib
 import json
 import subprocess
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
 from benchmarks import strata
-from benchmarks.frozen_table import MixedCommitsError, of_one_commit, table
+from benchmarks.frozen_table import MixedCommitsError, history, of_one_commit, table
 
 ROOT = Path(__file__).resolve().parents[1]
 BENCHES = 100_000  # seeds of a bench's noise
@@ -71,15 +71,15 @@ def begun(out: Path) -> tuple[list[dict[str, Any]], str]:
     return found, here
 
 
-def render(rows_file: Path, page: Path | None) -> str:
-    """The table of a file of rows; put into the page's block of that file where one is given."""
-    rows = read_rows(rows_file)
+def render(rows_files: Sequence[Path], page: Path | None) -> str:
+    """The table of a file of rows, or a line for each of several; put into the block of them of a page."""
     try:
-        text = table(rows)
+        text = table(read_rows(*rows_files)) if len(rows_files) == 1 else history(map(read_rows, rows_files))
     except MixedCommitsError as error:
-        raise click.ClickException(f"{rows_file}: {error}") from error
+        raise click.ClickException(f"{' '.join(map(str, rows_files))}: {error}") from error
     if page is not None:
-        page.write_text(with_table(page.read_text(encoding="utf-8"), rows_file.name, text), encoding="utf-8")
+        name = " ".join(file.name for file in rows_files)
+        page.write_text(with_table(page.read_text(encoding="utf-8"), name, text), encoding="utf-8")
     return text
 
 
@@ -112,10 +112,10 @@ def command(main: Callable[..., None]) -> click.Command:
         click.option("--trials", default=300, show_default=True, help="of all strata together"),
         click.option("--threads", default=2, show_default=True),
         click.option("--out", type=click.Path(path_type=Path), help="file of the rows"),
-        click.option("--render", "rows_file", type=click.Path(path_type=Path, exists=True),
-                     help="print the table of this file, and run nothing"),
+        click.option("--render", "rows_files", type=click.Path(path_type=Path, exists=True), multiple=True,
+                     help="print the table of this file, and run nothing; of several files a line for each"),
         click.option("--into", type=click.Path(path_type=Path, exists=True),
-                     help="with --render: put the table into this page's block of the file"),
+                     help="with --render: put that into this page's block of the files"),
     )  # fmt: skip
     for option in options:
         main = option(main)
@@ -123,10 +123,10 @@ def command(main: Callable[..., None]) -> click.Command:
 
 
 @command
-def main(trials: int, threads: int, out: Path | None, rows_file: Path | None, into: Path | None) -> None:
+def main(trials: int, threads: int, out: Path | None, rows_files: tuple[Path, ...], into: Path | None) -> None:
     """Run the trials of this commit that are missing, and print the table."""
-    if rows_file is not None:
-        click.echo(render(rows_file, into))
+    if rows_files:
+        click.echo(render(rows_files, into))
         return
     run(out or Path("var/frozen.jsonl"), strata.counts(trials), lambda *of: _trial(*of, threads))
 

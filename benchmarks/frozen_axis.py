@@ -21,10 +21,10 @@ from ema.models.axis_config import LinearAxis, RotaryAxis
 
 
 @frozen.command
-def main(trials: int, threads: int, out: Path | None, rows_file: Path | None, into: Path | None) -> None:
+def main(trials: int, threads: int, out: Path | None, rows_files: tuple[Path, ...], into: Path | None) -> None:
     """Run the trials of this commit that are missing, and print the table."""
-    if rows_file is not None:
-        click.echo(frozen.render(rows_file, into))
+    if rows_files:
+        click.echo(frozen.render(rows_files, into))
         return
     out = out or Path("var/frozen_axis.jsonl")
     frozen.run(out, strata_axis.counts(trials), lambda *of: trial(strata_axis.drawn(*of), threads))

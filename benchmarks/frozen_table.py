@@ -69,6 +69,33 @@ def beside(rows: Sequence[Row], others: Sequence[Row]) -> str:
     return f"{head}\n\n{markdown(('what', commits[1], commits[0]), lines)}"
 
 
+def history(runs: Iterable[Sequence[Row]]) -> str:
+    """One line for each run, in the order given: what it had of what is asked first of a finder."""
+    head = (
+        "commit",
+        "trials",
+        "named, or in a set",
+        "two or three at once",
+        "sure and wrong",
+        "alarms",
+        "outside, said so",
+    )
+    lines = []
+    for rows in runs:
+        seen = [row for row in rows if row["outcome"] != "refused"]
+        by_name = {what.partition(" (")[0]: measured for what, measured, _ in _aims(seen)}
+        asked = (
+            "named, or in a set that holds the truth",
+            "two or three at once, named or in sets",
+            "confidently wrong",
+            "false alarms",
+            "outside the library",
+        )
+        counts = [by_name[name].partition(" (")[0] for name in asked]
+        lines.append((f"`{of_one_commit(rows)[:9]}`", str(len(rows)), *counts))
+    return markdown(head, lines)
+
+
 def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table."""
     lines = [head, ["---"] * len(head), *rows]

@@ -49,7 +49,8 @@ EFFECT = Effect(
         Parameter("over", "rad", 1.0, 1e-6, 1e5, 1.0, "way over which what stiffens grows e times; long: parabolas"),
     ),
     sentence="a spring (or a cable) that is not equally stiff everywhere: {lower:.3g} N m/rad at the lower end of the "
-    "travel, {middle:.3g} N m/rad in the middle, {upper:.3g} N m/rad at the upper end",
+    "travel, {middle:.3g} N m/rad in the middle, {upper:.3g} N m/rad at the upper end; its {bias:.3g} N m in the "
+    "middle may be a constant load or friction by direction as well",
     separated_by="slow motion over the whole travel, and the same with the shaft upright",
     laws={"shaft_torque": torque},
     mistaken_for=("k1",),

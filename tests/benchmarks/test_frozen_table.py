@@ -160,7 +160,15 @@ def test_the_page_shows_the_tables_of_the_rows_that_are_kept():
     assert blocks
     for name, text in blocks:
         first, *other = (ROOT / "benchmarks" / "trials" / file for file in name.split(" beside "))
-        assert text == (other_commit.render(first, *other, None) if other else frozen.render(first, None))
+        several = [ROOT / "benchmarks" / "trials" / file for file in name.split()]
+        assert text == (other_commit.render(first, *other, None) if other else frozen.render(several, None))
+
+
+def test_a_run_is_one_line_of_the_history():
+    runs = [[row(), row(1, outcome="missed", nats=30.0)], [row(commit="b" * 40)]]
+    _, _, first, second = frozen_table.history(runs).splitlines()
+    assert [cell.strip() for cell in first.strip("|").split("|")][:3] == [f"`{HEAD[:9]}`", "2", "1 of 2"]
+    assert second.split("|")[3].strip() == "1 of 1"
 
 
 def test_two_commits_stand_beside_each_other_on_the_trials_that_both_have():
