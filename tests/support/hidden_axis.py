@@ -133,7 +133,7 @@ def inertia(bench, rng):
 def drive_gain(bench, rng):
     g = rng.choice([-1.0, 1.0]) * rng.uniform(0.03, 0.1)
     before = bench.measured_i
-    bench.measured_i = lambda i: before(i) * (1.0 + g)
+    bench.measured_i = lambda i: before(i) + g * i  # of the true current, whatever offset is there
     return {"gain": g}
 
 
