@@ -60,12 +60,11 @@ class Pack:
         self._acting: dict[tuple[float, str], dict[int, Array]] = {}  # the same
 
     def led_in(self, back: float) -> LedIn:
-        """The windows with the motion before each that acts in it still, `back` at the most. [s]
+        """The windows with the motion before each that still acts in it, `back` at the most. [s]
 
-        That is what a late sensor shows, and the voltage that made its current. One sample at least: so a delay of next
-        to nothing begins where none does.
+        That is what a late sensor shows, and the voltage that made its current.
         """
-        n = math.floor(back / self.windows[0].period + 1e-9) + 1
+        n = math.ceil(back / self.windows[0].period - 1e-9)
         if n not in self._led_in:
             first = dict(list(self._led_in.items())[:1])
             self._led_in = {**first, n: LedIn.of(self.windows, n)}

@@ -36,7 +36,7 @@ from .zeros import zeros
 
 NOISE = 3.0  # deviations of the position's noise that are no way
 RUNAWAY = 1e6  # a window that runs away counts as no worse than this
-SETTLED = 5.0  # time constants of a winding, by which 0.7 % is left of a current's beginning
+SETTLED = 7.0  # time constants of a winding, by which 0.1 % is left of a current's beginning
 H_MAX = 2.5e-4  # [s] longest step of the simulation, unless the record's own period is longer than ten of them
 
 
