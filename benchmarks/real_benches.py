@@ -49,7 +49,7 @@ def published(p: Mapping[str, float], joint: str) -> dict[str, float]:
     }
     if joint == "elbow":
         return {"inertia": outer, **of, "dry_friction": math.pi / 2 * p["cf2"], "viscous_drag": p["b2"]}
-    inner = {"linked_axis.gravity_inner": (p["m1"] * p["r1"] + p["m2"] * p["l1"]) * G}
+    inner = {"linked_axis.gravity": (p["m1"] * p["r1"] + p["m2"] * p["l1"]) * G}
     return {"inertia": whole, **of, **inner, "dry_friction": math.pi / 2 * p["cf1"], "viscous_drag": p["b1"]}
 
 

@@ -14,7 +14,7 @@ SAID = {
     "inertia": "own inertia, rotor and gear with it [kg m²]",
     "linked_axis.inertia": "by the other's acceleration [kg m²]",
     "linked_axis.coupling": "coupling m_2 r_2 l_1 [kg m²]",
-    "linked_axis.gravity_inner": "gravity of the inner link [N m]",
+    "linked_axis.gravity": "gravity of the inner link [N m]",
     "linked_axis.gravity_outer": "gravity m_2 r_2 g [N m]",
     "dry_friction": "dry friction [N m]",
     "viscous_drag": "drag [N m s/rad]",

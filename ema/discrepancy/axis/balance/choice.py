@@ -14,7 +14,7 @@ from .found import Balance, Term
 from .law import BY_RECORD, BY_RECORD_NAME, Law
 from .links import LINKS
 from .needed import ALARM, SIMPLER, Asked, chance, families_held, is_needed, simpler_families
-from .regression import Corrected, Plain, Regression, regress, turns_inertia
+from .regression import Corrected, Plain, Regression, is_machine, regress
 from .rows import Rows
 
 MOST_LAWS = 8  # a series of lines is one
@@ -90,7 +90,7 @@ def _try_each(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]
         if law.key not in have and law.family not in single:
             members.setdefault(law.family, []).append(law)
     trials = [regress(found, plain, _add(model, _best(found, model, own))) for own in members.values()]
-    return [r for r in trials if not turns_inertia(model, r)]
+    return [r for r in trials if is_machine(model, r, plain)]
 
 
 def _add(model: Regression, law: Law) -> list[Law]:
@@ -139,7 +139,7 @@ def _best_members(found: Rows, plain: Plain, model: Regression, every: Sequence[
         model = other if other.loss < model.loss else model
         for own in members if law.needs_acting else ():
             other = regress(found, plain, _add(without, own))
-            if _wins(law.name, model, {own.key: other})[law.name] <= SELDOM and not turns_inertia(model, other):
+            if _wins(law.name, model, {own.key: other})[law.name] <= SELDOM and is_machine(model, other, plain):
                 model = other
     return model
 

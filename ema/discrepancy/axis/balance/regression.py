@@ -9,6 +9,7 @@ import numpy as np
 
 from ema.core.records import Array
 from ema.discrepancy import blocks_left_out
+from ema.effects.position_friction import EFFECT as STRETCH
 
 from .law import BY_RECORD, Acting, Law
 from .rows import Rows
@@ -113,8 +114,23 @@ class Regression:
         return out
 
 
-def turns_inertia(model: Regression, other: Regression) -> bool:
-    """Whether the inertia, clearly above zero in `model`, is below it in `other`, which then is no machine.
+def is_machine(model: Regression, other: Regression, plain: Plain) -> bool:
+    """Whether `other`, which has a law more than `model`, has no inertia turned round and no friction that drives."""
+    return not (_turns_inertia(model, other) or _drives_by_friction(other, plain))
+
+
+def _drives_by_friction(model: Regression, plain: Plain) -> bool:
+    """Whether a stretch of other friction, the last law, has clearly less than none: it helps whichever way it goes."""
+    law = model.laws[-1]
+    if law.name != STRETCH.name or "dry_friction" not in model.base:
+        return False
+    both = [model.base.index("dry_friction"), model.part(law).start]
+    friction = plain.F_d + float(model.coefficients[both].sum())
+    return bool(friction < -BELOW * model.covariance()[np.ix_(both, both)].sum() ** 0.5)
+
+
+def _turns_inertia(model: Regression, other: Regression) -> bool:
+    """Whether the inertia, clearly above zero in `model`, is below it in `other`.
 
     Friction by a share of what drives can take the place of all that the drive is needed for, with the other sign.
     """
