@@ -79,13 +79,13 @@ def render(rows_files: Sequence[Path], page: Path | None) -> str:
         raise click.ClickException(f"{' '.join(map(str, rows_files))}: {error}") from error
     if page is not None:
         name = " ".join(file.name for file in rows_files)
-        page.write_text(with_table(page.read_text(encoding="utf-8"), name, text), encoding="utf-8")
+        page.write_text(with_block(page.read_text(encoding="utf-8"), f"frozen {name}", text), encoding="utf-8")
     return text
 
 
-def with_table(page: str, name: str, text: str) -> str:
-    """A page with the table in its block of that name; ClickException where it has none."""
-    begin, end = f"<!-- frozen {name} -->", "<!-- end -->"
+def with_block(page: str, name: str, text: str) -> str:
+    """A page with the text in its block of that name; ClickException where it has none."""
+    begin, end = f"<!-- {name} -->", "<!-- end -->"
     before, found, after = page.partition(begin)
     if not found or end not in after:
         raise click.ClickException(f"the page has no block {begin} … {end}")

@@ -90,11 +90,11 @@ def run(rows_file: Path, checkout: Path, out: Path) -> None:
         if (row["stratum"], row["number"]) in done:
             continue
         told, plant_file, records, beside_truth = as_given(row)
-        begun = _children_s()
+        begun = children_s()
         said = examined_by(checkout, plant_file, records)
         own = {"commit": commit, **{name: row[name] for name in ("stratum", "number", "seed")}, **told}
         found = said if "outcome" in said else beside_truth(said)
-        own |= {**found, "cpu_s": _children_s() - begun}
+        own |= {**found, "cpu_s": children_s() - begun}
         with out.open("a", encoding="utf-8") as file:
             file.write(json.dumps(own) + "\n")
         answer = f"{own['outcome']} {own.get('named', own.get('said'))}"
@@ -105,12 +105,12 @@ def render(rows_file: Path, out: Path, page: Path | None) -> str:
     """Both commits beside each other; put into the page's block of these files where one is given."""
     text = beside(frozen.read_rows(rows_file), frozen.read_rows(out))
     if page is not None:
-        block = f"{rows_file.name} beside {out.name}"
-        page.write_text(frozen.with_table(page.read_text(encoding="utf-8"), block, text), encoding="utf-8")
+        block = f"frozen {rows_file.name} beside {out.name}"
+        page.write_text(frozen.with_block(page.read_text(encoding="utf-8"), block, text), encoding="utf-8")
     return text
 
 
-def _children_s() -> float:
+def children_s() -> float:
     """Processor time of the processes that ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import math
-import resource
 import subprocess
 import sys
 import tempfile
@@ -21,7 +20,9 @@ from typing import Any
 import click
 import yaml
 
-from benchmarks.frozen import ROOT, begun
+from benchmarks.frozen import ROOT, begun, read_rows
+from benchmarks.frozen_table import MixedCommitsError
+from benchmarks.other_commit import children_s
 from benchmarks.real_tables import fill
 
 DATA = ROOT / "tests" / "data"
@@ -60,11 +61,11 @@ def examined(bench: dict[str, Any]) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "findings"
         words = ["discrepancy", "--plant", str(plant), *files, "--out", str(out)]
-        begin = _spent()
+        begin = children_s()
         run = subprocess.run(
             [Path(sys.executable).with_name("ema"), *words], capture_output=True, text=True, check=False
         )
-        cost = _spent() - begin
+        cost = children_s() - begin
         told = out / "findings.json"
         found = json.loads(told.read_text(encoding="utf-8")) if told.exists() else {}
     row: dict[str, Any] = {"bench": bench["bench"], "records": bench["records"], "exit": run.returncode, "cpu_s": cost}
@@ -76,12 +77,6 @@ def examined(bench: dict[str, Any]) -> dict[str, Any]:
     return row
 
 
-def _spent() -> float:
-    """Processor time of the commands run so far. [s]"""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
-
-
 @click.command()
 @click.option("--out", default="var/real.jsonl", show_default=True, type=click.Path(path_type=Path))
 @click.option(
@@ -91,9 +86,10 @@ def _spent() -> float:
 def main(out: Path, rows_file: Path | None, into: Path | None) -> None:
     """Examine the benches that are missing in the file, or render its tables."""
     if rows_file is not None:
-        rows = [json.loads(line) for line in rows_file.read_text(encoding="utf-8").splitlines()]
-        page = into.read_text(encoding="utf-8") if into else None
-        text = fill(rows, page)
+        try:
+            text = fill(read_rows(rows_file), into.read_text(encoding="utf-8") if into else None)
+        except MixedCommitsError as error:
+            raise click.ClickException(f"{rows_file}: {error}") from error
         into.write_text(text, encoding="utf-8") if into else click.echo(text)
         return
     rows, here = begun(out)

@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import click
-
+from benchmarks.frozen import with_block
 from benchmarks.frozen_table import Row, markdown, of_one_commit
 
 SAID = {
@@ -44,14 +43,10 @@ def fill(rows: Sequence[Row], page: str | None) -> str:
     if page is None:
         return "\n\n".join(made.values())
     for name, text in made.items():
-        before, found, after = page.partition(f"<!-- real {name} -->")
-        if not found or END not in after:
-            raise click.ClickException(f"the page has no block <!-- real {name} --> … {END}")
-        page = f"{before}{found}\n{text}\n{END}{after.partition(END)[2]}"
+        page = with_block(page, f"real {name}", text)
     return page
 
 
-END = "<!-- end -->"
 ANSWER = (
     "verdict",
     "causes, and how sure",

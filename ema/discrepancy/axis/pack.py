@@ -27,7 +27,7 @@ class LedIn:
     t: Array
     drive: Array
     load: Array
-    own: NDArray[np.bool_]
+    own: NDArray[np.bool_] | slice
 
     @classmethod
     def of(cls, windows: list[Window], n: int) -> LedIn:
@@ -55,7 +55,8 @@ class Pack:
         directions = [w.direction for w in windows if w.direction is not None]
         self.direction = np.concatenate(directions) if directions else None
         self.filter = join(filters) if filters else None
-        self._led_in: dict[int, LedIn] = {}  # the first and the last other one asked for
+        bare = LedIn(0, self.offsets, self.t, self.drive, self.load, slice(None))
+        self._led_in = {0: bare}  # and the last other one asked for
         self._histories: dict[tuple[float, int], History] = {}  # the last one asked for
         self._acting: dict[tuple[float, str], dict[int, Array]] = {}  # the same
 
@@ -66,8 +67,7 @@ class Pack:
         """
         n = math.ceil(back / self.windows[0].period - 1e-9)
         if n not in self._led_in:
-            first = dict(list(self._led_in.items())[:1])
-            self._led_in = {**first, n: LedIn.of(self.windows, n)}
+            self._led_in = {0: self._led_in[0], n: LedIn.of(self.windows, n)}
         return self._led_in[n]
 
     def drive_by(self, model: axis.Model, led_in: LedIn, between: str) -> Array:
