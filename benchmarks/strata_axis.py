@@ -27,8 +27,7 @@ NEAR = {
     "cushion": ("spring_load",), "gap": ("gear_compliance",), "maxwell_slip": ("friction_memory",),
     "heat": ("friction_drift",), "clutch": ("gear_compliance",),
     "one_way_fan": ("quadratic_drag", "viscous_by_direction"), "load_step": ("constant_load",),
-    # an axis that is driven by less torque per current is as one that is heavier and has more friction
-    "one_sided_driver": ("drive_unequal", "drive_gain", "magnet_flux", "inertia"),
+    "one_sided_driver": ("drive_unequal",),
 }  # fmt: skip
 # What is hidden as the second is the first too, where the motion shows it: that spring stiffens with its square.
 ALSO = {"stiffening_spring": "spring_load"}

@@ -5,18 +5,19 @@ from __future__ import annotations
 from .base import Effect, Parameter
 
 
-def torque(theta_m, w_m, theta_u, i_q, per_ampere):
-    """τ = c |i|: of the torque k_t i, c is added one way and taken the other   [N m]"""
-    return per_ampere * abs(i_q)
+def torque(theta_m, w_m, theta_u, i_q, positive, negative):
+    """τ = c₊ i where i > 0, c₋ i where i < 0: of the torque k_t i, that part is lost   [N m]"""
+    return positive * max(i_q, 0.0) + negative * min(i_q, 0.0)
 
 
 EFFECT = Effect(
     name="drive_unequal",
     parameters=(
-        Parameter("per_ampere", "N m/A", 0.0, -1.0, 1.0, 0.001, "torque lost with positive and gained with negative"),
+        Parameter("positive", "N m/A", 0.0, -1.0, 1.0, 0.001, "torque per current lost while it is positive"),
+        Parameter("negative", "N m/A", 0.0, -1.0, 1.0, -0.001, "torque per current lost while it is negative"),
     ),
-    sentence="one polarity of the drive gives more than the other: what opposes it has a part of {per_ampere:+.3g} "
-    "N m/A times the size of the current, whichever its sign",
+    sentence="the drive gives another torque with each polarity: {positive:+.3g} N m/A of the current is lost while it "
+    "is positive, {negative:+.3g} N m/A of the current while it is negative (below zero is gained)",
     separated_by="the same motions with the drive's polarity reversed",
     laws={"shaft_torque": torque},
     mistaken_for=("k1",),

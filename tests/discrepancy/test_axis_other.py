@@ -108,9 +108,11 @@ def test_a_drive_that_gives_more_one_way_than_the_other_is_named(axis_other):
     """Force + 0.1 |force|; the effect is what opposes the motion."""
     (found,) = look(axis_other, "stage", EVEN=0.1).effects
     assert found["name"] == "drive_unequal"
-    assert found["parameters"]["per_ampere"]["value"] == pytest.approx(-0.1, abs=0.001)
-    assert found["parameters"]["per_ampere"]["unit"] == "1"  # of a force, and no newtons per ampere
-    assert "a part of -0.1 times the size of the force" in found["sentence"]
+    told = found["parameters"]
+    assert told["positive"]["value"] == pytest.approx(-0.1, abs=0.001)
+    assert told["negative"]["value"] == pytest.approx(0.1, abs=0.001)
+    assert told["positive"]["unit"] == "1"  # of a force, and no newtons per ampere
+    assert "of the force is lost while it is positive" in found["sentence"]
 
 
 @pytest.mark.slow

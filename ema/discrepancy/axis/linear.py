@@ -31,7 +31,7 @@ SAID = {  # of those that begin alike the longest first
 
 
 # Of a drive whose own torque or force is recorded, what is per ampere of a current is a share.
-RECORDED = {"N m/A times the size of the current": "times the size of the {drive}", "N m/A": "1"}
+RECORDED = {"N m/A of the current": "of the {drive}", "N m/A": "1"}
 UNITS = {"current": "A", "voltage": "V", "force": "N", "torque": "N m"}
 
 

@@ -145,6 +145,12 @@ def _spring(v: Values, F_d: float, k_t: float) -> Effects:
     return {"spring_load": {"stiffness": k}, "constant_load": {"torque": -k * v["zero"]}}
 
 
+def _drive_unequal(v: Values, F_d: float, k_t: float) -> Effects:
+    """Lost one way and gained the other: what both lose is a scale of the drive, unknown here."""
+    c = v["share"] * k_t
+    return {"drive_unequal": {"positive": c, "negative": -c}}
+
+
 _MAKERS: Mapping[str, _Maker] = {
     "viscous_by_direction": _as_it_is("viscous_by_direction", "difference"),
     "pendulum": _as_it_is("pendulum", "amplitude", "phase", "turns"),
@@ -169,5 +175,5 @@ _MAKERS: Mapping[str, _Maker] = {
     "position_friction": _of_friction("position_friction", "height", "more", "centre", "width", "flatness"),
     "spring_load": _Maker(_spring),
     "stiffening_spring": _as_it_is("stiffening_spring", *(p.name for p in EFFECT.parameters)),
-    "drive_unequal": _Maker(lambda v, _, k_t: {"drive_unequal": {"per_ampere": v["share"] * k_t}}),
+    "drive_unequal": _Maker(_drive_unequal),
 }
