@@ -43,6 +43,8 @@ class Candidate:
         Values of parameters in the probes: those that are not linear.
     linear : tuple of str
         Parameters that the effect is (nearly) proportional to; one probe each.
+    shown : tuple of float
+        Their values, less neutral, as the residual torque itself shows them; none where it does not.
     """
 
     effect: str
@@ -50,6 +52,7 @@ class Candidate:
     fixed: Mapping[str, float]
     linear: tuple[str, ...]
     steps: tuple[float, ...]
+    shown: tuple[float, ...] = ()
 
     @property
     def faults(self) -> list[str]:
@@ -112,6 +115,10 @@ class Candidate:
         return {f.name: float(np.clip(point[f.name], f.low, f.high)) for f in self.frees} | {
             name: value for name, value in point.items() if name not in {f.name for f in self.frees}
         }
+
+    def shown_starts(self) -> list[Point]:
+        """The start that the residual torque shows, where it shows one."""
+        return [self.start(np.clip(self.shown, *self.limits()))] if self.shown else []
 
     def sizes(self) -> list[Point]:
         """Starts of the sizes that are usual, where one parameter tells the size."""
@@ -265,13 +272,15 @@ def candidates(
         held_back = {name: x for name, x in (("drag", gear.drag), ("friction", gear.friction)) if x}
         c = _plain("gear_compliance", "compliance", step=step, inertia=gear.inertia, damping=gear.damping, **held_back)
         found.append(Seen(**vars(c), faults_seen={"k2": gear.k2}))
-    for order, _ in lines(torques):
+    for of in lines(torques):
         frees = (
             free(f"{line}.amplitude", 0.002),
-            Free(f"{line}.order", max(order - 0.6, 1.0), order + 0.6, 0.04),
+            Free(f"{line}.order", max(of.order - 0.6, 1.0), of.order + 0.6, 0.04),
             Free(f"{line}.phase", -2.0 * np.pi, 2.0 * np.pi, 0.3),
         )
-        found.append(Line(line, frees, {"order": order}, ("amplitude",), (0.005,)))
-    for centre, width in bumps(torques):
-        found.append(_plain("position_friction", "height", step={"centre": 0.25 * width}, centre=centre, width=width))
+        found.append(Line(line, frees, {"order": of.order}, ("amplitude",), (0.005,), (of.sine, of.cosine)))
+    for centre, width, height in bumps(torques):
+        c = _plain("position_friction", "height", step={"centre": 0.25 * width}, centre=centre, width=width)
+        F_d = plant.transmission.F_d
+        found.append(replace(c, shown=(height / F_d,) if F_d > 0.0 else ()))
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -62,8 +63,25 @@ def _rank(search: Search, model: Model, found: Sequence[Candidate]) -> list[Scre
         )
         start = {**step_to(f.point, f.free, step[: len(f.free)]), **c.start(step[len(f.free) :])}
         ranked.append(Screened(promised, c, start))
+    ranked = _begin_where_shown(search, model, ranked)
     ranked = [s for s in ranked if not any(_does_as_well(t, s, AT_LEAST * float(r @ r)) for t in ranked)]
     return sorted(ranked, key=lambda entry: entry.promised)
+
+
+def _begin_where_shown(search: Search, model: Model, ranked: Sequence[Screened]) -> list[Screened]:
+    """Candidates that the residual torque itself shows, begun there where that, simulated, leaves less than promised.
+
+    That torque is known by the recorded angle. Where something else moves the rotor besides, a line that is simulated
+    without it is out of phase: its column promises little, and another order more.
+    """
+    starts = [[{**model.fit.point, **at} for at in s.candidate.shown_starts()] for s in ranked]
+    points = [point for of in starts for point in of]
+    costs = iter(search.costs(points, search.train, typical=False) if points else ())
+    found = []
+    for s, of in zip(ranked, starts, strict=True):
+        begun = [Screened(next(costs), s.candidate, point) for point in of]
+        found.append(min([s, *begun], key=lambda entry: entry.promised))
+    return found
 
 
 def probe(search: Search, found: Sequence[Candidate]) -> list[Candidate]:
@@ -71,7 +89,7 @@ def probe(search: Search, found: Sequence[Candidate]) -> list[Candidate]:
     new = [c for c in found if c.key not in search.probed]
     hidden = _simulate_probes(search, new, N_PROBE)
     _simulate_probes(search, [c.wider(WIDER) for c in new if c.key in hidden], N_PROBE_HIDDEN)
-    return [search.probed[c.key] for c in found]
+    return [replace(search.probed[c.key], shown=c.shown) for c in found]
 
 
 def _simulate_probes(search: Search, found: Sequence[Candidate], n_seeds: int) -> set[str]:
@@ -123,7 +141,7 @@ def rank_by_simulation(search: Search, model: Model, screened: Sequence[Screened
     alone = _starts_with(search, model, [s.candidate for s in screened], none)
     beside = {**model.fit.point, **none} if far else model.fit.point
     starts = [
-        [s.start, other, *({**beside, **size} for size in s.candidate.sizes())]
+        [s.start, other, *({**beside, **at} for at in (*s.candidate.shown_starts(), *s.candidate.sizes()))]
         for s, other in zip(screened, alone, strict=True)
     ]
     points = [point for of in starts for point in of]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ema.core.records import Array
 
-from .weak import Torque, line, lines, share_explained
+from .weak import Torque, lines, share_explained
 
 N_BINS = 12
 LEAST_NODES = 3.0  # in a part of a function, for its mean to be told
@@ -65,10 +65,7 @@ def structure(cycles: Sequence[Torque], rate: float, scores: dict[str, float]) -
     scores : dict
         z-score of each feature group (see `noise.verdict`).
     """
-    orders = [
-        {"order": order, "amplitude": float(np.hypot(*share_explained(cycles, line(order))[1])), "share": share}
-        for order, share in lines(cycles)
-    ]
+    orders = [{"order": of.order, "amplitude": of.amplitude, "share": of.share} for of in lines(cycles)]
     tones = np.array([_share_by_cycle(cycles, _tone(f, rate)) for f in FREQUENCIES])
     peak = int(np.argmax(tones))
     smooth_sign: Callable[[Torque], Array] = lambda c: np.tanh(c.w_m / 2.0)  # noqa: E731

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -85,30 +86,52 @@ def line(order: float) -> Callable[[Torque], Array]:
 
 def bump(centre: float, width: float) -> Callable[[Torque], Array]:
     """Friction higher around a position."""
-    return lambda c: -(np.sign(c.w_m) * np.exp(-(((c.theta_u - centre) / width) ** 2)))[None]
+    return lambda c: (np.sign(c.w_m) * np.exp(-(((c.theta_u - centre) / width) ** 2)))[None]
 
 
-def lines(cycles: Sequence[Torque]) -> list[tuple[float, float]]:
-    """The `N_LINES` strongest torque lines: order, share explained; peaks are at least 0.7 orders apart."""
-    shares = np.array([share_explained(cycles, line(order))[0] for order in ORDERS])
-    found: list[tuple[float, float]] = []
-    for j in np.argsort(shares)[::-1]:
-        if all(abs(ORDERS[j] - order) >= 0.7 for order, _ in found):
-            found.append((float(ORDERS[j]), float(shares[j])))
+class ShownLine(NamedTuple):
+    """A torque line  a cos nθ + b sin nθ  [N m] that opposes positive motion, and the share of the rest it takes."""
+
+    order: float
+    share: float
+    cosine: float
+    sine: float
+
+    @property
+    def amplitude(self) -> float:
+        """Of the line. [N m]"""
+        return float(np.hypot(self.cosine, self.sine))
+
+
+class ShownStretch(NamedTuple):
+    """A stretch of the travel, centre and width [rad], and by how much friction is higher in its middle. [N m]"""
+
+    centre: float
+    width: float
+    height: float
+
+
+def lines(cycles: Sequence[Torque]) -> list[ShownLine]:
+    """The `N_LINES` strongest torque lines; peaks are at least 0.7 orders apart."""
+    tried = [(order, *share_explained(cycles, line(order))) for order in ORDERS]
+    found: list[ShownLine] = []
+    for order, share, (cosine, sine) in sorted(tried, key=lambda entry: -entry[1]):
+        if all(abs(order - other.order) >= 0.7 for other in found):
+            found.append(ShownLine(float(order), float(share), float(cosine), float(sine)))
         if len(found) == N_LINES:
             break
     return found
 
 
-def bumps(cycles: Sequence[Torque]) -> list[tuple[float, float]]:
-    """The `N_STRETCHES` likeliest stretches of changed friction: centre and width. [rad]"""
+def bumps(cycles: Sequence[Torque]) -> list[ShownStretch]:
+    """The `N_STRETCHES` likeliest stretches of changed friction."""
     low, high = min(c.theta_u.min() for c in cycles), max(c.theta_u.max() for c in cycles)
-    grid = [(c, w) for c in np.linspace(low, high, 31) for w in (5e-4, 1e-3, 2e-3, 4e-3)]
-    shares = [share_explained(cycles, bump(c, w))[0] for c, w in grid]
-    order = np.argsort(shares)[::-1]
-    found = [grid[int(order[0])]]
-    for j in order:
-        c, w = grid[int(j)]
-        if len(found) < N_STRETCHES and all(abs(c - other) > max(w, width) for other, width in found):
-            found.append((c, w))
-    return [(float(c), float(w)) for c, w in found]
+    grid = [(float(c), w) for c in np.linspace(low, high, 31) for w in (5e-4, 1e-3, 2e-3, 4e-3)]
+    tried = [(*at, *share_explained(cycles, bump(*at))) for at in grid]
+    found: list[ShownStretch] = []
+    for c, w, _, (height,) in sorted(tried, key=lambda entry: -entry[2]):
+        if all(abs(c - other.centre) > max(w, other.width) for other in found):
+            found.append(ShownStretch(c, w, float(height)))
+        if len(found) == N_STRETCHES:
+            break
+    return found
