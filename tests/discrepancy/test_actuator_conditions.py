@@ -168,6 +168,13 @@ def test_zeros_of_rotor_and_user_are_told_apart_in_the_middle_of_the_play(hidden
     assert zero_apart(shipped_plant, signals) == pytest.approx(-zero, abs=max(5e-7, noise / 15.0))
 
 
+def test_zeros_are_told_apart_beside_a_resolver_that_wobbles(hidden, shipped_plant):
+    """The wobble is ten times the noise of the user's sensor; its mean over a turn is none of the zero."""
+    wobble = {"once_cosine": -0.011, "once_sine": -0.013, "twice_cosine": -0.008, "twice_sine": 0.002}
+    made = hidden.cycles(hidden.Flaws(**wobble), 2, 12, bench=hidden.Bench(user_zero=-4e-5))
+    assert zero_apart(shipped_plant, prepared(shipped_plant, made).signals) == pytest.approx(4e-5, abs=5e-7)
+
+
 def test_sound_sensors_and_a_gear_that_gives_have_no_zeros_apart(hidden, shipped_plant, cycles):
     assert zero_apart(shipped_plant, prepared(shipped_plant, cycles).signals) == 0.0
     soft = hidden.cycles(hidden.Flaws(compliance=2e-5, user_damping=10.0, load=4.0), 2, 13)

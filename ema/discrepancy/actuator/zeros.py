@@ -20,26 +20,41 @@ CLOSED = 0.5  # [rad] of the rotor after it has turned round, from where the pla
 STIFF = 1.5  # times the noise of θ_u that θ_m/GR - θ_u may vary by while the play is closed, with a stiff gear
 ENOUGH = 100  # samples on either side of the play
 SEEN = 2e-6  # [rad at the user] less makes no difference
+WOBBLES = (1, 2)  # periods of a resolver's error in a turn of the rotor
 MOVING = 2.0  # [rad/s]
 DIFFERENCE = 20  # samples over which the speed is taken
 
 
 def zero_apart(plant: Actuator, signals: Sequence[Signals]) -> float:
-    """θ_m/GR less θ_u in the middle of the play; 0 if not clear of 0, or if a gear that gives leaves it open. [rad]"""
-    sides: tuple[list[Array], list[Array]] = ([], [])
-    for s in signals:
-        d = s.theta_m[0] / plant.transmission.GR - s.theta_u[0]
-        way = _way(s.theta_m[0], plant.control.rate)
-        for side, sign in zip(sides, (1.0, -1.0), strict=True):
-            side.append(d[sign * way > CLOSED])
-    forth, back = (np.concatenate(side) for side in sides)
-    if min(len(forth), len(back)) < ENOUGH:
+    """θ_m/GR less θ_u in the middle of the play; 0 if not clear of 0, or if a gear that gives leaves it open. [rad]
+
+    Beside a resolver that wobbles it is the mean over a turn; 0 where the rotor turns too little to tell them apart.
+    """
+    theta_m = np.concatenate([s.theta_m[0] for s in signals])
+    d = theta_m / plant.transmission.GR - np.concatenate([s.theta_u[0] for s in signals])
+    way = np.concatenate([_way(s.theta_m[0], plant.control.rate) for s in signals])
+    sides = np.stack([way > CLOSED, way < -CLOSED]).astype(float)
+    if sides.sum(axis=1).min() < ENOUGH:
         return 0.0
-    middle = 0.5 * float(np.median(forth) + np.median(back))
+    closed = sides.any(axis=0)
+    d, theta_m, sides = d[closed], theta_m[closed], sides[:, closed]
     stated = float(np.hypot(plant.sensors.lvdt_noise, plant.sensors.lvdt_step / np.sqrt(12.0)))
     noise = max(stated, *(roughness(s.theta_u) for s in signals))
-    varies = float(np.sqrt(0.5 * (forth.var() + back.var())))
-    return middle if varies < STIFF * noise and abs(middle) > SEEN else 0.0
+    wobble = np.stack([of(n * theta_m) for n in WOBBLES for of in (np.cos, np.sin)])
+    for terms in (sides, np.concatenate([sides, wobble])):
+        middle, known, varies = _middle(terms.T, d)
+        if varies < STIFF * noise and known * noise < SEEN:
+            return middle if abs(middle) > SEEN else 0.0
+    return 0.0
+
+
+def _middle(terms: Array, d: Array) -> tuple[float, float, float]:
+    """The mean of what the first two terms take of `d`, its deviation over that of a sample, and the rms left."""
+    taken, *_ = np.linalg.lstsq(terms, d, rcond=None)
+    mean = np.zeros(terms.shape[1])
+    mean[:2] = 0.5
+    known = float(np.sqrt(mean @ np.linalg.pinv(terms.T @ terms) @ mean))
+    return float(mean @ taken), known, float(np.std(d - terms @ taken))
 
 
 def _way(theta_m: Array, rate: float) -> Array:
