@@ -44,7 +44,7 @@ class Candidate:
     linear : tuple of str
         Parameters that the effect is (nearly) proportional to; one probe each.
     shown : tuple of float
-        Their values, less neutral, as the residual torque itself shows them; none where it does not.
+        Their values, less neutral, as the residual torque or the sensors' zeros themselves show them; else none.
     """
 
     effect: str
@@ -117,7 +117,7 @@ class Candidate:
         }
 
     def shown_starts(self) -> list[Point]:
-        """The start that the residual torque shows, where it shows one."""
+        """The start that the record itself shows, where it shows one."""
         return [self.start(np.clip(self.shown, *self.limits()))] if self.shown else []
 
     def sizes(self) -> list[Point]:
@@ -227,8 +227,9 @@ def resolver_zero(plant: Actuator, zero: float) -> Candidate:
 
 
 def _commutation(plant: Actuator, zero: float) -> Candidate:
-    c = _plain("commutation_offset", "angle", "apart")
-    return Commutation(**vars(c), recorded=_electrical(plant, zero))
+    c, recorded = _plain("commutation_offset", "angle", "apart"), _electrical(plant, zero)
+    shown = (recorded, 0.0) if abs(zero) > plant.sensors.lvdt_step else ()
+    return Commutation(**vars(replace(c, shown=shown)), recorded=recorded)
 
 
 def _without_filter() -> Candidate:

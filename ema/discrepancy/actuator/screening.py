@@ -65,23 +65,35 @@ def _rank(search: Search, model: Model, found: Sequence[Candidate]) -> list[Scre
         ranked.append(Screened(promised, c, start))
     ranked = _begin_where_shown(search, model, ranked)
     ranked = [s for s in ranked if not any(_does_as_well(t, s, AT_LEAST * float(r @ r)) for t in ranked)]
-    return sorted(ranked, key=lambda entry: entry.promised)
+    return sorted(ranked, key=_promised)
 
 
 def _begin_where_shown(search: Search, model: Model, ranked: Sequence[Screened]) -> list[Screened]:
-    """Candidates that the residual torque itself shows, begun there where that, simulated, leaves less than promised.
+    """Candidates that the record itself shows, begun there where that, simulated, leaves less than promised.
 
-    That torque is known by the recorded angle. Where something else moves the rotor besides, a line that is simulated
-    without it is out of phase: its column promises little, and another order more.
+    Less what the parameters that `model` has free take of it to first order: these had stood for what was not there.
+
+    The residual torque is known by the recorded angle. Where something else moves the rotor besides, a line that is
+    simulated without it is out of phase: its column promises little, and another order more. What a commutation does
+    that is off with the resolver's zero is even in it, so that a column promises nothing.
     """
-    starts = [[{**model.fit.point, **at} for at in s.candidate.shown_starts()] for s in ranked]
+    f, noise = model.fit, search.noise
+    starts = [[{**f.point, **at} for at in s.candidate.shown_starts()] for s in ranked]
     points = [point for of in starts for point in of]
-    costs = iter(search.costs(points, search.train, typical=False) if points else ())
+    left = iter(residuals_at(search.plant, noise, points, search.train, N_GLANCE, SEED) if points else ())
+    own, limits = stacked_jacobian(noise, f.free, f.columns, search.train), bounds(f.free, f.point)
     found = []
     for s, of in zip(ranked, starts, strict=True):
-        begun = [Screened(next(costs), s.candidate, point) for point in of]
-        found.append(min([s, *begun], key=lambda entry: entry.promised))
+        for point in of:
+            at = next(left)
+            step, promised = solve_within_bounds(own, np.concatenate([at[c] for c in search.train]), *limits)
+            s = min(s, Screened(promised, s.candidate, {**point, **step_to(f.point, f.free, step)}), key=_promised)
+        found.append(s)
     return found
+
+
+def _promised(s: Screened) -> float:
+    return s.promised
 
 
 def probe(search: Search, found: Sequence[Candidate]) -> list[Candidate]:
@@ -153,7 +165,7 @@ def rank_by_simulation(search: Search, model: Model, screened: Sequence[Screened
     for s, of in zip(screened, starts, strict=True):
         least, best = min((next(costs), at) for at in range(len(of)))
         ranked.append(Screened(cost * least / here, s.candidate, of[best]))
-    return sorted(ranked, key=lambda entry: entry.promised)
+    return sorted(ranked, key=_promised)
 
 
 def columns_of(search: Search, c: Candidate) -> Array:
