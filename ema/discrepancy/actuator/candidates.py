@@ -60,6 +60,11 @@ class Candidate:
         return [name for name in registry()[self.effect].mistaken_for if name in FAULTS]
 
     @property
+    def is_seen(self) -> bool:
+        """Whether the effect is plain to see in the record."""
+        return False
+
+    @property
     def key(self) -> str:
         """Distinct for candidates with other probes."""
         of = f"{self.effect} {' '.join(self.linear)}"
@@ -134,6 +139,11 @@ class Seen(Candidate):
     """An effect that is plain to see in the record: a fit begins with what is seen there."""
 
     faults_seen: Point = field(default_factory=dict)
+
+    @property
+    def is_seen(self) -> bool:
+        """It is."""
+        return True
 
     def start(self, values: Array) -> Point:
         """The probe, and faults that are seen beside it."""

@@ -236,18 +236,24 @@ def _fit_for_several_faults(search: Search, model: Model, screened: Sequence[Scr
 def _fit_most_promising(
     search: Search, model: Model, screened: Sequence[Screened], known: Mapping[str, Model]
 ) -> dict[str, Model]:
-    """Those that promise most, one at least if none is known, until one leaves noise."""
+    """Those that promise most, one at least if none is known, until one leaves noise.
+
+    Before them what is plain to see in the record, whatever a simulation of it beside the wrong faults promises.
+    """
     cost = _cost(model)
     worth = max(WORTH_A_FIT * (cost - cost / model.fit.misfit), AT_LEAST * cost)
     found: dict[str, Model] = {}
     if any(leaves_noise(search, m) for m in known.values()):
         return found
-    for s in screened:
-        if (known or found) and cost - s.promised < worth:
-            break
-        if len(found) >= N_REFINED or (found and _stands_alone(search, found, s.promised)):
-            break
+    n_guessed = 0
+    for s in sorted(screened, key=lambda s: not s.candidate.is_seen):
+        if not s.candidate.is_seen:
+            if (known or found) and cost - s.promised < worth:
+                break
+            if n_guessed >= N_REFINED or (found and _stands_alone(search, found, s.promised)):
+                break
         if s.candidate.effect not in {*known, *found}:
+            n_guessed += not s.candidate.is_seen
             best = min(found.values(), key=lambda m: m.heldout, default=None)
             found[s.candidate.effect] = m = _fit_candidate(search, model, s, within_reach(best) if best else np.inf)
             if leaves_noise(search, m):
