@@ -5,10 +5,13 @@ from __future__ import annotations
 import pytest
 from hidden_actuator import PLANTS
 
+from benchmarks import strata
 from benchmarks.strata import as_actuator
+from ema.core.names import FAULTS
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.delays import see_delays
+from ema.discrepancy.actuator.examine import examine
 
 
 def seen(hidden, name, **flaws):
@@ -39,3 +42,17 @@ def test_a_delay_before_the_tap_and_one_of_the_recorder_are_told_beside_each_oth
 )
 def test_what_is_no_delay_shows_none(hidden, name, flaws):
     assert seen(hidden, name, **flaws) == {}
+
+
+@pytest.mark.slow
+def test_a_late_position_that_turns_the_loop_round_is_named_beside_three_faults(hidden):
+    """Beside the faults that were fitted without it, a simulation of it leaves more than one of drag."""
+    trial = strata.drawn("beside faults", 5, 205111440)
+    k = {name: x for name, x in zip(FAULTS, trial.k, strict=True) if x}
+    made = hidden.cycles(hidden.Flaws(**trial.values, **k), 6, 11440, trial.motions, trial.bench)
+    record = Record(tuple(Cycle(n, c) for n, c in enumerate(made)))
+    found = examine(trial.actuator, prepare(trial.actuator, [record])).findings
+    assert [e.name for e in found.effects] == ["position_delay"]
+    assert found.verdict == "explained"
+    assert found.effects[0].parameters["time"].value == pytest.approx(trial.values["position_delay"], rel=0.02)
+    assert found.gain.k_after == pytest.approx(trial.k, abs=0.003)
