@@ -142,13 +142,16 @@ def reliability(answers: Sequence[tuple[float, bool]]) -> list[tuple[str, str, s
 
 
 def _posterior(rows: Sequence[Row]) -> list[str]:
-    """The same of the first set of the posterior, where rows have one."""
-    firsts = [(row["posterior"][0], row) for row in rows if row.get("posterior")]
+    """The same of the first set of the posterior, where a row has one and its verdict says that nothing else is left.
+
+    Beside a rest these are odds of the sets that were fitted, given that one of them is right.
+    """
+    firsts = [(row["posterior"][0], row) for row in rows if row.get("posterior") and row["verdict"] in QUIET]
     if not firsts:
         return []
     answers = [(float(first["probability"]), set(first["effects"]) == truth(row)) for first, row in firsts]
     return [
-        "The same of the first set of the posterior: exactly the hidden effects, none more.",
+        "The same of the first set of the posterior, where nothing else is left: exactly the hidden effects.",
         markdown(("P", "stated on average", "right"), reliability(answers)),
     ]
 

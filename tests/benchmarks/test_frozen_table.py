@@ -123,6 +123,7 @@ def test_the_first_set_of_the_posterior_has_a_diagram_of_its_own():
     text = frozen_table.table([row(posterior=[first])])
     assert "The same of the first set of the posterior" in text
     assert cells(text.split("posterior")[1], "0.8 to 0.95")[2].startswith("0 of 1")
+    assert "posterior" not in frozen_table.table([row(posterior=[first], verdict="unexplained")])
 
 
 def test_rows_as_they_were_first_written_are_rendered():
