@@ -5,8 +5,8 @@ what it does before it slides and leave little more than noise: where they miss 
 unexplained and more times the noise than the balance does beside the creeping, that one rules. It rules, too, where
 they miss much of the motion and leave more times the noise: what is named there is the best of what does not fit. And
 where noise alone makes much of the motion in a free run, and they are as good with a law as without it, they are no
-witness against what the balance sees: the verdict is then its own, of held-out blocks of torque, and says so. Where
-they follow the motion to within little and leave noise, the record is adequate whatever small thing the balance holds
+witness against what the balance sees: the verdict is then its own, of held-out blocks of torque, and says so. A balance
+that sees nothing does not rule out a torque without a name by which they follow the motion. Where they follow the motion to within little and leave noise, the record is adequate whatever small thing the balance holds
 on to: it smooths what is shorter than its test functions, as the end of a reversal.
 """
 
@@ -84,6 +84,8 @@ def _why_it_rules(plant: AxisPlant, outcome: Outcome, b: Balance, left: Left, mi
     unsolved = outcome.verdict in ("partly explained", "unexplained")
     is_closer = unsolved and left.residual.rest < outcome.left.residual.rest
     leave_little = outcome.left.residual.rest <= outcome.left.allowed
+    if not missing and outcome.structure and outcome.rest <= outcome.left.allowed:
+        return ""  # what sees nothing is no witness against a torque by which free runs follow the motion
     if b.creeps and not (_know_creeping(outcome) and leave_little) and (missed > WITNESS or is_closer):
         return CREEPS.format(b.creeps)
     if missed > WITNESS and is_closer and not leave_little:

@@ -28,12 +28,18 @@ def plant_of(module, **hidden):
 FITTED = {"J": 0.14, "F_d": 0.25, "C": 0.02}  # as free runs would
 
 
-def as_free_runs_had(verdict, noise=0.5, missed=0.5, rest=1.0, named=()):
-    """As free runs of which noise makes a part of the motion, and that miss one, with a rest of so many times noise."""
+def as_free_runs_had(verdict, noise=0.5, missed=0.5, rest=1.0, named=(), nameless=None):
+    """As free runs of which noise makes a part of the motion, and that miss one, with a rest of so many times noise.
+
+    `nameless` is what they leave with a torque that has no name.
+    """
     left = SimpleNamespace(residual=SimpleNamespace(rest=rest), allowed=LIMIT)
     folds = SimpleNamespace(noise_floor=noise, err_after=missed)
     effects = [{"name": name} for name in named]
-    return SimpleNamespace(verdict=verdict, point=FITTED, folds=folds, left=left, effects=effects)
+    structure = {} if nameless is None else {"terms": ["a torque at 25 Hz"]}
+    return SimpleNamespace(
+        verdict=verdict, point=FITTED, folds=folds, left=left, effects=effects, structure=structure, rest=nameless
+    )
 
 
 def test_a_law_that_free_runs_are_blind_to_is_named_by_the_balance_which_says_so(short_pendulum):
@@ -69,6 +75,14 @@ def test_of_an_axis_that_creeps_the_balance_speaks_where_free_runs_miss_the_moti
     assert [e.name for e in said.effects] == ["pendulum"]
     assert "creeps in 40%" in said.note
     assert rule_by_balance(plant, as_free_runs_had("explained", noise=0.01, missed=0.01)) is None
+
+
+def test_a_balance_that_sees_nothing_is_no_witness_against_a_torque_by_which_free_runs_follow(short_pendulum):
+    plant = plant_of(short_pendulum, G=0.0)
+    plant._balances[plant.between] = replace(plant.balance, creeps=0.1)
+    free_runs = {"noise": 0.01, "missed": 0.01, "rest": 25.0}
+    assert rule_by_balance(plant, as_free_runs_had("unexplained", **free_runs, nameless=1.1)) is None
+    assert rule_by_balance(plant, as_free_runs_had("unexplained", **free_runs, nameless=5.0)) is not None
 
 
 def test_of_an_axis_that_creeps_the_balance_speaks_where_it_leaves_fewer_times_the_noise(short_pendulum):
