@@ -71,6 +71,12 @@ class Folds:
         return self._jackknife(lambda w: _rms(after, w) / max(_rms(floor, w), 1e-300))
 
     @property
+    def relative_rest_error(self) -> float:
+        """Standard error of the logarithm of `rest`: a ratio is skewed, and parts that differ widely are no chance."""
+        after, floor = np.array(self.after), np.array(self.floor)
+        return self._jackknife(lambda w: float(np.log(max(_rms(after, w), 1e-300) / max(_rms(floor, w), 1e-300))))
+
+    @property
     def event(self) -> tuple[str, float, float] | None:
         """The one part that leaves far more than all others, with what it and the most of these leave; else None.
 

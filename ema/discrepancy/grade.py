@@ -26,6 +26,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 if TYPE_CHECKING:
     from .folds import Folds
 
@@ -73,8 +75,9 @@ class Left:
         far more than all others is sure. The error in the plant's own unit is not: of free runs one part may make most
         of it.
         """
-        error = self.error.rest - UPPER * self.error.rest_error if len(self.error.names) > 1 else self.error.rest
-        return self.residual.rest > self.allowed or error > self.allowed or self.residual.event is not None
+        scatter = self.error.relative_rest_error if len(self.error.names) > 1 else 0.0
+        error = self.error.rest * np.exp(-UPPER * scatter)
+        return bool(self.residual.rest > self.allowed or error > self.allowed or self.residual.event is not None)
 
     @property
     def event(self) -> str:

@@ -126,7 +126,7 @@ def clock_skew(bench, rng):
 
 def inertia(bench, rng):
     d = rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.3)
-    bench.J *= 1.0 + d
+    bench.J, bench.J_load = (1.0 + d) * bench.J, (1.0 + d) * bench.J_load  # of all of it, whatever shaft it is behind
     return {"change": d}
 
 

@@ -6,8 +6,9 @@ unexplained and more times the noise than the balance does beside the creeping, 
 they miss much of the motion and leave more times the noise: what is named there is the best of what does not fit. And
 where noise alone makes much of the motion in a free run, and they are as good with a law as without it, they are no
 witness against what the balance sees: the verdict is then its own, of held-out blocks of torque, and says so. A balance
-that sees nothing does not rule out a torque without a name by which they follow the motion. Where they follow the motion to within little and leave noise, the record is adequate whatever small thing the balance holds
-on to: it smooths what is shorter than its test functions, as the end of a reversal.
+that sees nothing does not rule out a torque without a name by which they follow the motion. Where they follow the
+motion to within little and leave noise, the record is adequate whatever small thing the balance holds on to: it smooths
+what is shorter than its test functions, as the end of a reversal.
 """
 
 from __future__ import annotations
@@ -70,7 +71,8 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
     if b is None:
         return None
     if b.given:
-        own = [_of_neighbour(b, b.given[0], _share_of_rest(b, b.given[0]))] if _is_seen(b) else []
+        sure = _share_of_rest(b, b.given[0]) if _is_seen(b) else 0.0
+        own = [_of_neighbour(b, b.given[0], sure)] if sure >= NAMED else []
         own += [_of_neighbour(b, t.law, b.of_set(t)) for t in b.terms if t.law.name == COUPLED and b.of_set(t) >= NAMED]
         return Ruling([*own, *name_laws(plant, b, find_missing(b, []))], _measure_left(plant, b), NEIGHBOUR)
     left, missing = _measure_left(plant, b), find_missing(b, [])
@@ -133,8 +135,9 @@ def _measure_left(plant: AxisPlant, b: Balance) -> Left:
 
     names, weight = tuple(f"block {k + 1}" for k in range(len(parts))), tuple(float(own.size) for own in parts)
     folds = Folds(names, of(before), of(b.model.held_out**2), of(rows.sigma**2), weight)
-    unsure = max(folds.rest_error if np.isfinite(folds.rest_error) else 0.0, plant.noise_uncertainty)
-    return Left(folds.rest <= 1.0 + UPPER * unsure, folds, folds, noise_uncertainty=plant.noise_uncertainty)
+    scatter = folds.relative_rest_error
+    unsure = max(scatter if np.isfinite(scatter) else 0.0, plant.noise_uncertainty)
+    return Left(folds.rest <= np.exp(UPPER * unsure), folds, folds, noise_uncertainty=plant.noise_uncertainty)
 
 
 def _is_seen(b: Balance) -> bool:
