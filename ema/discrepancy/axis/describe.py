@@ -129,7 +129,10 @@ def _sentence(family: str, v: dict[str, float], unit: str) -> tuple[str, list[st
     what = "friction" if v["is_friction"] else "torque" if unit == "N m" else "force"
     if v["order"]:
         times = " per ampere" if v["current_power"] else ""
-        nature = "" if abs(v["order"] - round(v["order"])) < 0.02 else ", no whole number: no part of the motor itself"
+        is_whole = abs(v["order"] - round(v["order"])) < 0.02
+        nature = "" if is_whole else ", no whole number: no part of the motor itself"
+        if is_whole and times and not v["is_friction"]:
+            nature = ", as a torque constant does that ripples with the angle (harmonics of the magnets' flux)"
         where = f"with {v['order']:.4g} periods per turn{nature}"
         if unit == "N":
             where = f"over the travel, once in {2.0 * np.pi / v['order']:.3g} m"
@@ -138,7 +141,11 @@ def _sentence(family: str, v: dict[str, float], unit: str) -> tuple[str, list[st
             ["angle", *(["current"] if v["current_power"] else [])],
         )
     if v["frequency"]:
-        return f"{what} of {size:.3g} {unit} swings with {v['frequency']:.4g} Hz in time", ["time"]
+        return (
+            f"{what} of {size:.3g} {unit} swings with {v['frequency']:.4g} Hz in time, whatever the motion: of the "
+            "supply, the bench or a neighbour",
+            ["time"],
+        )
     if v["angle_width"]:
         return (
             f"{what} changes by {v['coefficient']:+.3g} {unit} around position {v['angle_centre']:.4g}, "

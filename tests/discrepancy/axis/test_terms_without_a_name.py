@@ -123,6 +123,7 @@ def test_a_line_is_said_by_its_order_and_on_a_linear_axis_by_its_length():
     assert "once in 1.4 m" in linear["terms"][0]["sentence"]
     whole = said(ROTARY, [term], point | {"term1.order": 5.0})
     assert "no whole number" not in whole["terms"][0]["sentence"]
+    assert "as a torque constant does that ripples with the angle" in whole["terms"][0]["sentence"]
     assert said(ROTARY, [], {}) == {"terms": [], "orders": [], "frequencies": [], "depends_on": []}
 
 
