@@ -27,7 +27,7 @@ NEAR = {
     "cushion": ("spring_load",), "gap": ("gear_compliance",), "maxwell_slip": ("friction_memory",),
     "heat": ("friction_drift",), "clutch": ("gear_compliance",),
     "one_way_fan": ("quadratic_drag", "viscous_by_direction"), "load_step": ("constant_load",),
-    "one_sided_driver": ("drive_unequal",),
+    "one_sided_driver": ("drive_unequal",), "current_ripple": ("flux_ripple",),
 }  # fmt: skip
 # What is hidden as the second is the first too, where the motion shows it: that spring stiffens with its square.
 ALSO = {"stiffening_spring": "spring_load"}

@@ -40,7 +40,7 @@ def effects(plant: Measured, found: Sequence[Candidate], point: Point, drawn: Se
             same = [there for s in samples if (there := own.like(key, s)) is not None]
             parameters = {}
             for name, value in values.items():
-                spread = [there[name] for there in same]
+                spread = [there[name] for there in same if name in there]  # an effect may be there of another kind
                 low, high = interval(name, value, spread or [value])
                 parameters[name] = {"value": value, "low": low, "high": high, "unit": unit[name]}
             entry = {

@@ -26,6 +26,7 @@ SCREENED = (
     *("viscous_by_direction", "pendulum", "output_load_friction", "drive_unequal", "viscous_slope", "friction_slope"),
     *(
         "stiffening_spring",
+        "flux_ripple",
         "gear_error",
         "position_line",
         "quadratic_load_friction",
@@ -35,7 +36,7 @@ SCREENED = (
 )
 ROOM = 10.0  # times the size that the regression found, to which a fit may go
 FIXED = (  # parameters that the records of one bench hardly show
-    *("turns", "centre", "half", "over", "since", "damping", "shape"),
+    *("turns", "order", "centre", "half", "over", "since", "damping", "shape"),
 )
 FITTED = {"inertia": {"J", "M"}, "viscous_drag": {"C"}}  # what a fit changes in their place
 VAGUE = ("viscous_by_temperature.coefficient",)  # shown where records are warm enough to bend the law: else a prior

@@ -60,6 +60,14 @@ def test_without_draws_there_is_no_interval_and_without_effects_nothing_is_said(
     assert effects(ROTARY, [nameless], {"viscous_drag.coefficient": 2.0}, []) == []
 
 
+def test_draws_that_have_the_effect_of_another_kind_say_nothing_of_a_size_that_they_have_not():
+    skew = Candidate("clock_skew by a constant time", "clock_skew", free("clock_skew.late"), ())
+    drawn = [{"clock_skew.rate": 0.001}, {"clock_skew.late": 1e-4}, {"clock_skew.late": 3e-4}]
+    (entry,) = effects(ROTARY, [skew], {"clock_skew.late": 2e-4}, drawn)
+    q = entry["parameters"]["late"]
+    assert 1e-4 <= q["low"] < q["value"] < q["high"] <= 3e-4
+
+
 def test_a_phase_near_half_a_turn_has_a_narrow_interval():
     rng = np.random.default_rng(0)
     drawn = [{line(12, "sin"): -1.0, line(12, "cos"): x} for x in 0.05 * rng.standard_normal(400)]

@@ -11,6 +11,7 @@ from numpy.polynomial.chebyshev import chebvander
 
 from ema.core.records import Array
 from ema.discrepancy.axis.linear import in_metres
+from ema.effects.flux_ripple import EFFECT as FLUX_RIPPLE
 from ema.effects.position_friction import EFFECT as STRETCH
 from ema.effects.position_friction import FORMS, fading
 from ema.effects.position_line import EFFECT as POSITION_LINE
@@ -23,6 +24,7 @@ from .units import LINEAR, Units
 N_PLACES, N_ORDERS = 12, 320  # members of a family
 LEAST_TURN = 0.3  # [rad] of travel that shows a sine of the angle apart from a straight line
 HIGHEST_ORDER = 260.0
+HIGHEST_RIPPLE = 96  # six per electrical turn, of 16 pole pairs
 FEWEST_PERIODS = 2.0  # of a line within the travel
 CLOSED = 0.1  # of a period: a map of one turn ends a step before it begins
 STRETCHES = (0.05, 0.15, 0.3)  # half widths of a stretch of other friction, of the travel
@@ -59,6 +61,8 @@ def by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[L
         )
     yield from _gear_lines(m, span, u)
     yield from _lines(span, u, linear=linear, but=m.gear_orders)
+    if moves and not linear:
+        yield from _flux_ripples(span, u)
     yield Law(
         "friction along the travel",
         "friction along the travel",
@@ -234,11 +238,40 @@ def _gear_lines(m: Motion, span: float, u: Units) -> Iterator[Law]:
 def _lines(span: float, u: Units, *, linear: bool, but: tuple[float, ...]) -> Iterator[Law]:
     resolution = 2.0 * np.pi / span
     step = resolution if linear else 1.0  # a torque locked to a rotor closes after a turn
-    lowest = FEWEST_PERIODS * resolution if linear else max(2.0, float(np.ceil(FEWEST_PERIODS * resolution - CLOSED)))
+    lowest = FEWEST_PERIODS * resolution if linear else float(_lowest_order(span))
     for n in np.arange(lowest, min(HIGHEST_ORDER * step, lowest + step * N_ORDERS), step):
         if n in but:
             continue  # stands among the gear's
         yield _line_along(float(n), step, u) if linear else _line_of_a_turn(float(n), u)
+
+
+def _flux_ripples(span: float, u: Units) -> Iterator[Law]:
+    """A share of the motor's own torque, by lines."""
+    for n in range(_lowest_order(span), HIGHEST_RIPPLE + 1):
+        yield Law(
+            "flux ripple",
+            f"flux ripple {n}",
+            FLUX_RIPPLE.name,
+            _share_of_motor(n),
+            {"amplitude": "1", "order": "1/turn", "phase": "rad"},
+            _of_line(float(n)),
+            f"{{amplitude:.2%}} of the drive's {u.said} come and go, with {{order:.4g}} periods per turn: a torque "
+            "constant that ripples",
+            FLUX_RIPPLE.separated_by,
+            needs_acting=True,
+            n_columns=2,
+        )
+
+
+def _share_of_motor(n: float) -> Columns:
+    """τ cos nθ, τ sin nθ"""
+    line = _line(n)
+    return lambda m, acting: tuple(acting.motor * part for part in line(m, acting))
+
+
+def _lowest_order(span: float) -> int:
+    """Of a line that closes after a turn."""
+    return int(max(2.0, np.ceil(FEWEST_PERIODS * 2.0 * np.pi / span - CLOSED)))
 
 
 def _torque_line(family: str, key: str, name: str, n: float, sentence: str, separated_by: str, u: Units) -> Law:

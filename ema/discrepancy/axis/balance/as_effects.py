@@ -151,6 +151,10 @@ def _drive_unequal(v: Values, F_d: float, k_t: float) -> Effects:
     return {"drive_unequal": {"positive": c, "negative": -c}}
 
 
+def _flux_ripple(v: Values, F_d: float, k_t: float) -> Effects:
+    return {"flux_ripple": {**v, "amplitude": v["amplitude"] * k_t}}
+
+
 _MAKERS: Mapping[str, _Maker] = {
     "viscous_by_direction": _as_it_is("viscous_by_direction", "difference"),
     "pendulum": _as_it_is("pendulum", "amplitude", "phase", "turns"),
@@ -176,4 +180,5 @@ _MAKERS: Mapping[str, _Maker] = {
     "spring_load": _Maker(_spring),
     "stiffening_spring": _as_it_is("stiffening_spring", *(p.name for p in EFFECT.parameters)),
     "drive_unequal": _Maker(_drive_unequal),
+    "flux_ripple": _Maker(_flux_ripple),
 }
