@@ -23,13 +23,14 @@ from .balance.found import Balance
 from .balance.of_records import balance, plain_of
 from .balance.own_zeros import refine_zeros
 from .intake import take_in
+from .lateness import see_delays
 from .measured import Zero
 from .naming import numbers_of
 from .noise import ESTIMATE_UNCERTAINTY
 from .noise_model import position_noise, whitener, without_start
 from .pack import Pack
 from .predictable import LONGEST_WINDOW, predictable_time
-from .screened import begin_with_balance, suggest_by_balance
+from .screened import begin_with_what_shows, suggest_by_balance
 from .undersampled import refuse_undersampled
 from .windows import Bench, Window, bench
 from .zeros import zeros
@@ -124,9 +125,16 @@ class AxisPlant:
         return [*candidates.library(self, point, blocks), *suggest_by_balance(self.balance, self.plant, point)]
 
     def seen_together(self, point: Point) -> list[Candidate]:
-        """Effects that the balance of torque needs beside each other, begun where it has them."""
+        """Effects that channels and the balance of torque show beside each other, begun where these have them."""
         library = {c.key: c for c in candidates.library(self, point, range(len(self.blocks)))}
-        return begin_with_balance(self.balance, self.plant, library)
+        return begin_with_what_shows(self.balance, self.delays, self.plant, library)
+
+    @cached_property
+    def delays(self) -> dict[str, float]:
+        """By how much the speed is late behind the position, or that behind the speed, in the first record. [s]"""
+        roles, cycles = self.benches[0].roles, self.records[0].cycles
+        moves = not self.benches[0].static and roles.position is not None and roles.speed is not None
+        return see_delays(cycles, str(roles.position), str(roles.speed)) if moves else {}
 
     def structure(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Terms that the torque residual along the measured motion suggests."""

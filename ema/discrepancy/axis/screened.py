@@ -59,18 +59,23 @@ def suggest_by_balance(balance: Balance | None, plant: Axis, point: Point) -> li
     return out
 
 
-def begin_with_balance(balance: Balance | None, plant: Axis, library: Mapping[str, Candidate]) -> list[Candidate]:
-    """Every law that the balance needs, begun there; with the library's own freedom where it has that effect.
+def begin_with_what_shows(
+    balance: Balance | None, delays: Mapping[str, float], plant: Axis, library: Mapping[str, Candidate]
+) -> list[Candidate]:
+    """Delays that the channels show, and every law that the balance needs, begun there.
 
-    First an inertia and a drag that are not the plant file's, where that has them as known; but no lines of torque, of
-    which a search finds each in what the others leave.
+    With the library's own freedom where it has that effect. First delays, then an inertia and a drag that are not the
+    plant file's, where that has them as known; but no lines of torque, of which a search finds each in what the others
+    leave.
     """
     if balance is None:
         return []
+    shown = {name: {"time": late} for name, late in delays.items()}
+    shown |= {name: values for name, values in of_base(balance).items() if not FITTED[name] & set(plant.fitted)}
     out = {
         name: _start(library[name], {f"{name}.{p}": value for p, value in values.items()})
-        for name, values in of_base(balance).items()
-        if name in library and not FITTED[name] & set(plant.fitted)
+        for name, values in shown.items()
+        if name in library
     }
     for term in balance.terms:
         unsure = errors(balance, term)
