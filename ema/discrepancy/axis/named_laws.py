@@ -6,11 +6,15 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ema.discrepancy import findings as shared
 from ema.discrepancy.grade import NAMED
+from ema.discrepancy.plant import FORM
+from ema.discrepancy.rounds import IMMATERIAL
 from ema.effects import registry
 
-from .balance.as_effects import draw_effects, effects, friction
+from .balance.as_effects import FITTED, draw_effects, effects, friction, of_base
 from .balance.found import Balance, Term
 from .interval import interval
 from .linear import of_axis, units_of
@@ -26,6 +30,44 @@ def find_missing(b: Balance, found: Sequence[shared.FoundEffect]) -> list[Term]:
     told = {name for e in found for name in (e.name, *e.indistinguishable_from)}
     new = [term for term in b.terms if (name := name_law(b, term)) and not {name, *term.unseen} & told]
     return [term for term in new if b.of_set(term) >= NAMED]
+
+
+def name_base(plant: AxisPlant, b: Balance) -> list[shared.FoundEffect]:
+    """Inertia and drag that are clearly not the plant file's, where that has them as known.
+
+    As sure as their mark, what they take of the balance, over that, all that is more than noise, and what the form of
+    the other may make.
+    """
+    said, found = partial(of_axis, linear=plant.plant.is_linear), []
+    clear = {name: values for name, values in of_base(b).items() if not FITTED[name] & set(plant.plant.fitted)}
+    marks = {name: _mark(b, b.model.base.index(name)) for name in clear}
+    for name, values in clear.items():
+        form = FORM**2 * sum(mark for other, mark in marks.items() if other != name)
+        sure = round(min(marks[name] / max(marks[name] + b.left - b.noise + form, 1e-300), 1.0), 4)
+        if sure < NAMED or marks[name] < IMMATERIAL * b.noise:
+            continue
+        at = b.model.base.index(name)
+        ((key, value),) = values.items()
+        sd = abs(value / _beyond(b, at)) * float(np.sqrt(b.corrected.covariance[at, at]))
+        ends = value - shared.WITHIN * sd, value + shared.WITHIN * sd
+        effect = registry()[name]
+        quantity = shared.Quantity(value, *ends, units_of(effect, said)[key])
+        sentence = said(effect.said(values, friction(b))) + ALONE
+        found.append(shared.FoundEffect(name, sure, (), {key: quantity}, sentence, said(effect.separated_by)))
+    return found
+
+
+def _mark(b: Balance, at: int) -> float:
+    """Mean square that a coefficient of the base takes of the balance beside all others, for not being the file's."""
+    beside, _ = np.linalg.qr(np.delete(b.model.design, at, axis=1))
+    own = b.model.design[:, at] - beside @ (beside.T @ b.model.design[:, at])
+    return _beyond(b, at) ** 2 * float(np.mean(own**2))
+
+
+def _beyond(b: Balance, at: int) -> float:
+    """A coefficient of the base less the plant file's."""
+    of_file = b.plain.inertia if b.model.base[at] == "inertia" else 0.0  # drag is fitted less the file's
+    return float(b.corrected.coefficients[at]) - of_file
 
 
 def name_laws(plant: AxisPlant, b: Balance, terms: Sequence[Term]) -> list[shared.FoundEffect]:

@@ -33,7 +33,7 @@ from .balance.links import COUPLED
 from .balance.needed import ALARM, chance
 from .balance.regression import regress
 from .balance.telling import of_given
-from .named_laws import find_missing, name_laws
+from .named_laws import find_missing, name_base, name_laws
 
 if TYPE_CHECKING:
     from .plant import AxisPlant
@@ -77,7 +77,7 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
         return Ruling([*own, *name_laws(plant, b, find_missing(b, []))], _measure_left(plant, b), NEIGHBOUR)
     left, missing = _measure_left(plant, b), find_missing(b, [])
     why = _why_it_rules(plant, outcome, b, left, missing)
-    return Ruling(name_laws(plant, b, missing), left, why) if why else None
+    return Ruling([*name_base(plant, b), *name_laws(plant, b, missing)], left, why) if why else None
 
 
 def _why_it_rules(plant: AxisPlant, outcome: Outcome, b: Balance, left: Left, missing: Sequence[Term]) -> str:

@@ -17,7 +17,7 @@ from ema.effects import registry
 from ema.effects.position_line import EFFECT as POSITION_LINE
 from ema.models.axis_config import LINES, Axis
 
-from .balance.as_effects import effects, errors, find_alternatives, line_point, of_base
+from .balance.as_effects import FITTED, effects, errors, find_alternatives, line_point, of_base
 from .balance.found import Balance
 from .candidates import PRIOR
 from .naming import line
@@ -38,7 +38,6 @@ ROOM = 10.0  # times the size that the regression found, to which a fit may go
 FIXED = (  # parameters that the records of one bench hardly show
     *("turns", "order", "centre", "half", "over", "since", "damping", "shape"),
 )
-FITTED = {"inertia": {"J", "M"}, "viscous_drag": {"C"}}  # what a fit changes in their place
 VAGUE = ("viscous_by_temperature.coefficient",)  # shown where records are warm enough to bend the law: else a prior
 
 

@@ -77,6 +77,20 @@ def test_of_an_axis_that_creeps_the_balance_speaks_where_free_runs_miss_the_moti
     assert rule_by_balance(plant, as_free_runs_had("explained", noise=0.01, missed=0.01)) is None
 
 
+def test_a_drag_that_the_file_has_as_known_is_named_where_the_balance_rules(short_pendulum):
+    """The balance fits inertia and drag in any case: that they are others than the plant file's is no silence."""
+    build = short_pendulum.Pendulum(G=0.0, C=0.3, **QUIET)
+    known = {"J": build.J, "fitted": []}
+    plant = AxisPlant(
+        RotaryAxis.model_validate({**short_pendulum.plant(build), **known}), [short_pendulum.record(build, 2)]
+    )
+    plant._balances[plant.between] = replace(plant.balance, creeps=0.4)
+    said = rule_by_balance(plant, as_free_runs_had("partly explained", noise=0.01, missed=0.5, rest=25.0))
+    assert [e.name for e in said.effects] == ["viscous_drag"]
+    assert said.effects[0].confidence > 0.9
+    assert said.effects[0].parameters["coefficient"].value == pytest.approx(0.3, rel=0.05)
+
+
 def test_a_balance_that_sees_nothing_is_no_witness_against_a_torque_by_which_free_runs_follow(short_pendulum):
     plant = plant_of(short_pendulum, G=0.0)
     plant._balances[plant.between] = replace(plant.balance, creeps=0.1)

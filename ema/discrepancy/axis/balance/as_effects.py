@@ -17,6 +17,7 @@ from .found import Balance, Term, draw_law
 from .law import Law
 
 CLEAR = 3.0  # standard deviations by which the plant file is off
+FITTED = {"inertia": {"J", "M"}, "viscous_drag": {"C"}}  # what a fit changes in the place of these effects
 Effects = dict[str, dict[str, float]]
 Values = Mapping[str, float]
 
