@@ -21,13 +21,14 @@ from benchmarks import strata_laws
 from ema.core.records import Array, Cycle, Record
 
 EFFECTS = list(hidden_axis.LIBRARY)
-OUTSIDE = [*hidden_axis.OUTSIDE, *(kind for kind in strange.KINDS if kind not in ("nothing", "current_lag"))]
+# Of other simulators, what the library has got a law for since.
+LEARNT = {"one_sided_driver": "drive_unequal", "current_ripple": "flux_ripple"}
+OUTSIDE = [kind for kind in (*hidden_axis.OUTSIDE, *strange.KINDS) if kind not in ("nothing", "current_lag", *LEARNT)]
 # Effects of the library that act like what is outside it, so that naming them is the right place.
 NEAR = {
     "cushion": ("spring_load",), "gap": ("gear_compliance",), "maxwell_slip": ("friction_memory",),
     "heat": ("friction_drift",), "clutch": ("gear_compliance",),
     "one_way_fan": ("quadratic_drag", "viscous_by_direction"), "load_step": ("constant_load",),
-    "one_sided_driver": ("drive_unequal",), "current_ripple": ("flux_ripple",),
 }  # fmt: skip
 # What is hidden as the second is the first too, where the motion shows it: that spring stiffens with its square.
 ALSO = {"stiffening_spring": "spring_load"}
@@ -155,7 +156,16 @@ def _three(number: int, seed: int, plant: str) -> Trial:
 
 
 def _outside(number: int, seed: int, plant: str) -> Trial:
-    kind = OUTSIDE[number % len(OUTSIDE)]
+    return of_kind(OUTSIDE[number % len(OUTSIDE)], seed, plant)
+
+
+def of_kind(kind: str, seed: int, plant: str) -> Trial:
+    """A law of another simulator; of what the library has learnt, the effect is hidden."""
+    made = _of_other_simulator(kind, seed, plant)
+    return replace(made, effects=(LEARNT[kind],)) if kind in LEARNT else made
+
+
+def _of_other_simulator(kind: str, seed: int, plant: str) -> Trial:
     if kind in hidden_axis.OUTSIDE:
         return _bench([kind], seed, plant)
     torque, heavier, *_ = PLANTS[plant]
@@ -166,7 +176,11 @@ def _outside(number: int, seed: int, plant: str) -> Trial:
 
 
 def _law(number: int, seed: int, plant: str) -> Trial:
-    """A law of a warm, geared, compliant axis, or none, under cascaded loops."""
+    """A law of a warm, geared, compliant axis, or none, under cascaded loops; or one of those learnt."""
+    kinds = [*strata_laws.HIDDEN, *LEARNT, "nothing"]
+    name = kinds[number % len(kinds)]
+    if name in LEARNT:
+        return of_kind(name, seed, plant)
     rng = np.random.default_rng(seed)
     torque, heavier, *_ = PLANTS[plant]
     d = geared.Axis()
@@ -174,8 +188,6 @@ def _law(number: int, seed: int, plant: str) -> Trial:
         d, J=d.J * torque * heavier * rng.uniform(0.7, 1.4), F=d.F * torque * rng.uniform(0.7, 1.4), C=d.C * torque,
         k_t=d.k_t * torque,
     )  # fmt: skip
-    kinds = [*strata_laws.HIDDEN, "nothing"]
-    name = kinds[number % len(kinds)]
     h = strata_laws.Hidden(axis) if name == "nothing" else strata_laws.hidden(name, axis, rng)
     size, loop = rng.uniform(0.7, 1.4), (40.0, 0.05 * heavier)
     records = tuple(

@@ -32,6 +32,7 @@ def test_every_effect_that_an_axis_may_have_is_hidden_by_some_stratum():
     laws = [strata_laws.hidden(name, strata_laws.geared.Axis(), rng) for name in strata_laws.HIDDEN]
     effects = [h.effects for h in laws]
     hidden = {*strata_axis.EFFECTS, *(e for some in effects for e in some), "viscous_by_direction", "drive_compliance"}
+    hidden |= {*strata_axis.LEARNT.values()}
     mine = {name for name, e in registry().items() if "axis" in e.plants}
     assert mine - hidden == {"encoder_error", "position_line"}
     assert all(e in registry() for e in hidden)

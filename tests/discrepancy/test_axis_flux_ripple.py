@@ -14,8 +14,8 @@ from ema.models.axis_config import RotaryAxis
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.further)])
 def test_a_torque_constant_that_ripples_is_named_with_order_and_size(seed):
-    trial = strata_axis.drawn("outside the library", strata_axis.OUTSIDE.index("current_ripple"), seed)
-    assert trial.case == "current_ripple"
+    trial = strata_axis.of_kind("current_ripple", seed, list(strata_axis.PLANTS)[seed % 3])
+    assert trial.effects == ("flux_ripple",)
     plant = AxisPlant(RotaryAxis.model_validate(trial.plant_file), trial.records)
     found = findings(plant, examine_ways(plant)).as_dict()["effects"]
     ripple = next(effect for effect in found if effect["name"] == "flux_ripple")
