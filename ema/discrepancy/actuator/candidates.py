@@ -207,6 +207,11 @@ class Commutation(Candidate):
 
     recorded: float = 0.0
 
+    @property
+    def is_seen(self) -> bool:
+        """Whether the zeros show it: then it is off by that, or it is the user's zero, which only a fit tells."""
+        return bool(self.shown)
+
     def start(self, values: Array) -> Point:
         """What the currents commutate against the recorded angle, and what that angle is off by."""
         apart = values[self.linear.index("apart")]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,18 @@ def everything(shipped_plant, hidden):
     """Each effect as a candidate, by name."""
     data = prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(hidden.cycles(hidden.Flaws(), 2))))])
     return {c.effect: c for c in candidates(shipped_plant, data, [])}
+
+
+def test_a_commutation_is_tried_whatever_it_promises_where_the_zeros_lie_apart_by_more_than_a_step(
+    shipped_plant, hidden
+):
+    """Beside shorts that have moved in its place a start that is right promises next to nothing."""
+    made = enumerate(hidden.cycles(hidden.Flaws(), 2))
+    data = prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in made))])
+    for zero, is_seen in ((3e-5, True), (1e-6, False)):
+        of = {c.effect: c for c in candidates(shipped_plant, replace(data, zero=zero), [])}
+        assert of["commutation_offset"].is_seen == is_seen
+        assert len(of["commutation_offset"].shown_starts()) == is_seen
 
 
 def test_probes_of_any_size_are_as_many_as_their_columns(everything):

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks import strata
 from benchmarks.strata import as_actuator
+from ema.core.names import FAULTS
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.examine import split
+from ema.discrepancy.actuator.examine import examine, split
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
 from ema.discrepancy.actuator.screening import rank_to_first_order
@@ -53,3 +55,17 @@ def test_a_tight_stretch_begins_with_its_place_and_height(screened):
     assert name == "position_friction"
     assert left < 0.5
     assert start["position_friction.centre"] == pytest.approx(5e-4, abs=3e-4)
+
+
+@pytest.mark.further
+@pytest.mark.slow
+def test_a_commutation_that_the_zeros_show_is_named_beside_offsets_and_drag(hidden):
+    trial = strata.drawn("three effects", 2, 3249995962)
+    assert set(trial.told["effects"]) == {"current_offset", "commutation_offset", "quadratic_drag"}
+    k = {name: x for name, x in zip(FAULTS, trial.k, strict=True) if x}
+    made = hidden.cycles(hidden.Flaws(**trial.values, **k), 6, 95962, trial.motions, trial.bench)
+    record = Record(tuple(Cycle(n, c) for n, c in enumerate(made)))
+    found = {e.name: e for e in examine(trial.actuator, prepare(trial.actuator, [record])).findings.effects}
+    assert found.keys() == set(trial.told["effects"])
+    told = found["commutation_offset"].parameters["angle"].value
+    assert told == pytest.approx(trial.values["commutation"], rel=0.1)
