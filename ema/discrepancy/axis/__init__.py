@@ -10,6 +10,7 @@
 `measured`      what searches and the balance need of the plant
 `sizes`         typical sizes in the records
 `screened`      effects that are tried where the balance shows their law
+`lateness`      which of position and speed is late, by these two alone
 `candidates`    library effects scaled to this axis, with starts
 `cogging`       the order scan
 `gear`          the scan for a resonance of a gear that gives
