@@ -11,10 +11,11 @@ Transactions on Industrial Electronics 43, 1996, doi:10.1109/41.491356.
 
 from __future__ import annotations
 
-from math import pi
-
 from .base import Effect, Parameter
+from .cogging import EFFECT as COGGING
 from .vector_math import sin
+
+_, _order, _phase = COGGING.parameters
 
 
 def torque(theta_m, w_m, theta_u, i_q, amplitude, order, phase):
@@ -26,8 +27,8 @@ EFFECT = Effect(
     name="flux_ripple",
     parameters=(
         Parameter("amplitude", "N m/A", 0.0, 0.0, 100.0, 0.001, "amplitude of the torque constant's ripple"),
-        Parameter("order", "1/turn", 12.0, 1.0, 240.0, 12.0, "periods per mechanical turn"),
-        Parameter("phase", "rad", 0.0, -pi, pi, 0.0, "phase at an angle of zero"),
+        _order,
+        _phase,
     ),
     sentence="the drive gives {amplitude:.3g} N m/A of the current more and less, with {order:.4g} periods per rotor "
     "turn: a torque constant that ripples (harmonics of the magnets' flux, unequal phases)",

@@ -14,7 +14,7 @@ from ema.discrepancy.plant import FORM
 from ema.discrepancy.rounds import IMMATERIAL
 from ema.effects import registry
 
-from .balance.as_effects import FITTED, draw_effects, effects, friction, of_base
+from .balance.as_effects import FITTED, beyond_file, draw_effects, effects, friction, of_base
 from .balance.found import Balance, Term
 from .interval import interval
 from .linear import of_axis, units_of
@@ -40,7 +40,7 @@ def name_base(plant: AxisPlant, b: Balance) -> list[shared.FoundEffect]:
     """
     said, found = partial(of_axis, linear=plant.plant.is_linear), []
     clear = {name: values for name, values in of_base(b).items() if not FITTED[name] & set(plant.plant.fitted)}
-    marks = {name: _mark(b, b.model.base.index(name)) for name in clear}
+    marks = {name: _mark(b, name) for name in clear}
     for name, values in clear.items():
         form = FORM**2 * sum(mark for other, mark in marks.items() if other != name)
         sure = round(min(marks[name] / max(marks[name] + b.left - b.noise + form, 1e-300), 1.0), 4)
@@ -48,7 +48,7 @@ def name_base(plant: AxisPlant, b: Balance) -> list[shared.FoundEffect]:
             continue
         at = b.model.base.index(name)
         ((key, value),) = values.items()
-        sd = abs(value / _beyond(b, at)) * float(np.sqrt(b.corrected.covariance[at, at]))
+        sd = abs(value / beyond_file(b)[name]) * float(np.sqrt(b.corrected.covariance[at, at]))
         ends = value - shared.WITHIN * sd, value + shared.WITHIN * sd
         effect = registry()[name]
         quantity = shared.Quantity(value, *ends, units_of(effect, said)[key])
@@ -57,17 +57,12 @@ def name_base(plant: AxisPlant, b: Balance) -> list[shared.FoundEffect]:
     return found
 
 
-def _mark(b: Balance, at: int) -> float:
-    """Mean square that a coefficient of the base takes of the balance beside all others, for not being the file's."""
+def _mark(b: Balance, name: str) -> float:
+    """Mean square that inertia or drag takes of the balance beside all others, for not being the file's."""
+    at = b.model.base.index(name)
     beside, _ = np.linalg.qr(np.delete(b.model.design, at, axis=1))
     own = b.model.design[:, at] - beside @ (beside.T @ b.model.design[:, at])
-    return _beyond(b, at) ** 2 * float(np.mean(own**2))
-
-
-def _beyond(b: Balance, at: int) -> float:
-    """A coefficient of the base less the plant file's."""
-    of_file = b.plain.inertia if b.model.base[at] == "inertia" else 0.0  # drag is fitted less the file's
-    return float(b.corrected.coefficients[at]) - of_file
+    return beyond_file(b)[name] ** 2 * float(np.mean(own**2))
 
 
 def name_laws(plant: AxisPlant, b: Balance, terms: Sequence[Term]) -> list[shared.FoundEffect]:

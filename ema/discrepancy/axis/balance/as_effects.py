@@ -29,19 +29,23 @@ def effects(b: Balance, term: Term) -> Effects:
 
 def of_base(b: Balance) -> Effects:
     """Inertia and drag that are clearly others than the plant file's, as effects beside it."""
-    fitted = dict(zip(b.model.base, b.corrected.coefficients, strict=False))
     sd = dict(zip(b.model.base, np.sqrt(np.diag(b.corrected.covariance)), strict=False))
-    more = {
-        "inertia": fitted.get("inertia", b.plain.inertia) - b.plain.inertia,
-        "viscous_drag": fitted.get("viscous_drag", 0.0),
-    }
-    clear = {name: float(x) for name, x in more.items() if name in sd and abs(x) > CLEAR * sd[name]}
+    clear = {name: x for name, x in beyond_file(b).items() if name in sd and abs(x) > CLEAR * sd[name]}
     out: Effects = {}
     if "viscous_drag" in clear:
         out["viscous_drag"] = {"coefficient": clear["viscous_drag"]}
     if "inertia" in clear and b.plain.inertia > 0.0:
         out["inertia"] = {"change": clear["inertia"] / b.plain.inertia}
     return out
+
+
+def beyond_file(b: Balance) -> dict[str, float]:
+    """Inertia and drag as fitted, less the plant file's."""
+    fitted = dict(zip(b.model.base, b.corrected.coefficients, strict=False))
+    return {
+        "inertia": float(fitted.get("inertia", b.plain.inertia)) - b.plain.inertia,
+        "viscous_drag": float(fitted.get("viscous_drag", 0.0)),  # that is fitted so
+    }
 
 
 def errors(b: Balance, term: Term) -> Effects:
