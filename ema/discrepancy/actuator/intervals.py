@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ema.core.names import FAULTS
 from ema.discrepancy.engine.contest import Outcome, Weighed
-from ema.discrepancy.findings import WITHIN
 
 from .fit import stacked_jacobian
 from .model import Model
@@ -17,6 +18,14 @@ if TYPE_CHECKING:
     from .search import Search
 
 FORM = 0.5  # of a value, for a rest as large as the whole effect: the interval holds what would take all of the rest
+
+
+@dataclass(frozen=True)
+class Size:
+    """A value and its standard deviation."""
+
+    value: float
+    sd: float
 
 
 def deviation(name: str, score: float, model: Model, outcome: Outcome) -> float:
@@ -34,22 +43,22 @@ def deviation(name: str, score: float, model: Model, outcome: Outcome) -> float:
     return max(score, fit * min(1.0, score / beside_all)) if beside_all > 0.0 else max(score, fit)
 
 
-def of_faults(search: Search, model: Model, outcome: Outcome, is_noise: bool) -> tuple[tuple[float, float], ...]:
-    """Intervals of 95 % of all faults, by score and fit, and where these disagree, both.
+def of_faults(model: Model, outcome: Outcome) -> dict[str, Size]:
+    """Faults by the score, which drops those that are not there; by the fit where the set was not weighed."""
+    own = _weighed(model, outcome)
+    if own is None:
+        return {name: Size(model.fit.point.get(name, 0.0), model.fit.sd.get(name, 0.0)) for name in FAULTS}
+    return {name: Size(own.point[name], deviation(name, own.sd[name], model, outcome)) for name in FAULTS}
 
-    Where what is left is no noise, they hold what it may have made of a fault too: a friction that comes and goes is on
-    average a larger one, and what is left of it says how much of that may be no fault.
+
+def hold_rest(search: Search, model: Model, faults: Mapping[str, Size]) -> dict[str, Size]:
+    """Faults with deviations that hold what a rest, which is no noise, may have made of them.
+
+    A friction that comes and goes is on average a larger one, and what is left of it says how much of that may be no
+    fault.
     """
-    own, found = _weighed(model, outcome), []
-    of_rest = {} if is_noise else _by_rest(search, model)
-    for name in FAULTS:
-        k = model.fit.point.get(name, 0.0)
-        sd, apart = model.fit.sd.get(name, 0.0), 0.0
-        if own is not None and name in own.sd:
-            sd, apart = deviation(name, own.sd[name], model, outcome), own.point[name] - k
-        within = WITHIN * float(np.linalg.norm([sd, apart, FORM * of_rest.get(name, 0.0)]))
-        found.append((max(k - within, 0.0), min(k + within, 1.0)))
-    return tuple(found)
+    of_rest = _by_rest(search, model)
+    return {n: replace(of, sd=float(np.hypot(of.sd, FORM * of_rest.get(n, 0.0)))) for n, of in faults.items()}
 
 
 def _by_rest(search: Search, model: Model) -> dict[str, float]:

@@ -18,7 +18,7 @@ from . import controller, repeating
 from .entrants import describe_posterior
 from .extension import write_extension
 from .fit import SEED, Fit
-from .intervals import FORM, deviation, of_faults
+from .intervals import FORM, deviation, hold_rest, of_faults
 from .leave_out import over_folds, square
 from .model import CHANCE, FINAL_SEED, N_FINAL, Model
 from .noise import SEED as NOISE_SEED
@@ -31,7 +31,7 @@ from .weighing import WORTH_IT, is_enough
 if TYPE_CHECKING:
     from .search import Search
 
-IMPLEMENTATION = 2e-3  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
+IMPLEMENTATION = 5e-4  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
 MOST_OF_IT = 0.95  # share of what faults alone leave that effects must explain to be named beside an unexplained rest
 UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: a rest is left that nothing explains
 IN_LIBRARY = 0.99  # probability that what does it is in the library at all, where it leaves nothing
@@ -241,7 +241,12 @@ def _envelope_error(search: Search, point: Point, cycles: list[int]) -> float:
 
 
 def _gain(search: Search, before: Model, after: Model, v: Verdict, made: Remains, outcome: Outcome) -> Gain:
-    k_before, k_after = (tuple(round(m.fit.point.get(n, 0.0), 5) for n in FAULTS) for m in (before, after))
+    faults = of_faults(after, outcome)
+    if not v.is_noise:
+        faults = hold_rest(search, after, faults)
+    k_after = tuple(round(faults[n].value, 5) for n in FAULTS)
+    k_before = k_after if after.fit is before.fit else tuple(round(before.fit.point.get(n, 0.0), 5) for n in FAULTS)
+    ends = ((of.value - WITHIN * of.sd, of.value + WITHIN * of.sd) for of in faults.values())
     return Gain(
         _envelope_error(search, before.fit.point, search.train),
         _envelope_error(search, after.fit.point, search.train),
@@ -252,7 +257,7 @@ def _gain(search: Search, before: Model, after: Model, v: Verdict, made: Remains
         k_after,
         sum(x > FAULT_ALARM for x in k_before),
         sum(x > FAULT_ALARM for x in k_after),
-        of_faults(search, after, outcome, v.is_noise),
+        tuple((max(low, 0.0), min(high, 1.0)) for low, high in ends),
         folds=made.error,
         residual=made.left.residual,
     )

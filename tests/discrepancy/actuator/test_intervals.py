@@ -9,7 +9,6 @@ import pytest
 
 from ema.core.names import FAULTS
 from ema.discrepancy.actuator import intervals
-from ema.discrepancy.findings import WITHIN
 
 FREE = [SimpleNamespace(name=name) for name in FAULTS]
 SCORE, BESIDE, FITTED = 1e-4, 1e-3, 5e-3
@@ -40,17 +39,14 @@ def test_a_deviation_is_the_fits_less_the_doubt_about_faults_that_the_score_has_
     assert intervals.deviation("k1", SCORE, model, outcome) == SCORE
 
 
-def test_a_fault_holds_fit_and_score_and_stays_between_nothing_and_all(model, outcome):
-    model.fit.sd = dict.fromkeys(FAULTS, 0.01)
-    outcome.weighed[0].point["k1"] = 0.15
-    low, high = intervals.of_faults(None, model, outcome, is_noise=True)[0]
-    assert low == 0.0
-    assert high > 0.15  # where the two disagree it holds both
-    model.fit.point["k1"] = 0.99
+def test_a_fault_is_told_by_the_score_and_by_the_fit_where_its_set_was_not_weighed(model, outcome):
+    """A fit keeps a short of 0.2 % that is not there; the score drops it."""
+    model.fit.point = {"k1": 0.031, "k3": 0.002}
+    told = intervals.of_faults(model, outcome)
+    assert told["k1"] == intervals.Size(0.03, pytest.approx(SCORE * FITTED / BESIDE))
+    assert told["k3"].value == 0.0
     outcome.weighed.clear()
-    low, high = intervals.of_faults(None, model, outcome, is_noise=True)[0]
-    assert low == pytest.approx(0.99 - WITHIN * 0.01)
-    assert high == 1.0
+    assert intervals.of_faults(model, outcome)["k3"] == intervals.Size(0.002, FITTED)
 
 
 def test_a_fault_may_be_what_a_rest_of_its_own_size_is_in_the_balance_where_it_acts(model, outcome, monkeypatch):
@@ -64,12 +60,9 @@ def test_a_fault_may_be_what_a_rest_of_its_own_size_is_in_the_balance_where_it_a
 
     def told(rest: float):
         model.fit.residuals = {0: np.array([rest, 0.0, 0.0, 0.0, 0.0, 0.0])}
-        model.fit.point["k2"] = 0.03
-        return intervals.of_faults(search, model, outcome, is_noise=False)
+        return intervals.hold_rest(search, model, {"k1": known, "k2": known})
 
-    model.fit.sd, outcome.weighed[0].sd = dict.fromkeys(FAULTS, 1e-4), dict.fromkeys(FAULTS, 1e-4)
-    outcome.weighed[0].point["k2"] = 0.03
-    assert told(0.0)[0][0] == pytest.approx(0.03 - WITHIN * 1e-4, abs=1e-5)
-    assert 0.0 < told(15.0)[0][0] < told(0.0)[0][0]
-    assert told(32.0)[0][0] == 0.0
-    assert told(32.0)[1] == told(0.0)[1]
+    known = intervals.Size(0.03, 1e-4)
+    assert told(0.0)["k1"] == known
+    assert told(30.0)["k1"].sd == pytest.approx(intervals.FORM * 0.03, rel=1e-3)
+    assert told(30.0)["k2"] == known
