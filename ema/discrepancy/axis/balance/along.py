@@ -183,12 +183,7 @@ def _any(centre: float, half: float, u: Units) -> Law:
 
 
 def _line(order: float) -> Columns:
-    def columns(m: Motion, _: Acting) -> tuple[Array, ...]:
-        """None of it where it passes faster than half the rate: sampled there, it would look like a slow one."""
-        seen = np.clip(2.0 - np.abs(order * m.sweep) / (0.5 * np.pi), 0.0, 1.0)  # fades from half of that on
-        return (seen * np.cos(order * m.theta), seen * np.sin(order * m.theta))
-
-    return columns
+    return lambda m, _: m.waves(order)
 
 
 def _of_line(order: float) -> Values:

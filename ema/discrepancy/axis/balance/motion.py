@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ema.core.records import Array
+
+MOST_WAVES = 128  # orders whose waves are kept: those of a ripple, and the lines of a model
 
 
 @dataclass(frozen=True)
@@ -49,3 +52,17 @@ class Motion:
             steps = np.diff(self.t[own])
             out[own] = self.w[own] * float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
         return out
+
+    @cached_property
+    def waves(self) -> Callable[[float], tuple[Array, Array]]:
+        """cos nθ and sin nθ of an order n; of the last ones asked for they are kept.
+
+        None of it where it passes faster than half the rate: sampled there, it would look like a slow one.
+        """
+
+        @lru_cache(maxsize=MOST_WAVES)
+        def of(order: float) -> tuple[Array, Array]:
+            seen = np.clip(2.0 - np.abs(order * self.sweep) / (0.5 * np.pi), 0.0, 1.0)  # fades from half of that on
+            return seen * np.cos(order * self.theta), seen * np.sin(order * self.theta)
+
+        return of

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -55,17 +56,25 @@ class Regression:
         Residual. [N m or N]
     held_out : array, shape (n_rows,)
         Residual of rows whose block was not fitted; nan for rows that lie in two blocks.
-    acting : Acting
+    taken : Acting
+        What laws that depend on what else acts were fitted with.
     """
 
     rows: Rows
+    plain: Plain
     laws: tuple[Law, ...]
     base: tuple[str, ...]
     design: Array
     coefficients: Array
     left: Array
     held_out: Array
-    acting: Acting
+    taken: Acting
+
+    @cached_property
+    def acting(self) -> Acting:
+        """What this model needs of the drive; most models are tried and left, and nobody asks."""
+        own = [law.columns(self.rows.motion, self.taken) for law in self.laws]
+        return _split_drive(self.rows, self.plain, self.base, self.laws, own, self.coefficients)
 
     @property
     def losses(self) -> Array:
@@ -153,18 +162,20 @@ def regress(rows: Rows, plain: Plain, laws: Sequence[Law], *, apart: bool = Fals
         columns = (columns[:, :, None] * of[:, None, :]).reshape(len(rows.y), -1)
     m = rows.motion
     acting = Acting(m.drive, m.drive, m.drive)
-    waits = any(law.needs_acting for law in laws)
-    if waits:
+
+    def design(acting: Acting) -> Array:
+        return np.column_stack([columns, *(column for law in laws for column in rows.of(law, acting))])
+
+    if any(law.needs_acting for law in laws):
         acting = regress(rows, plain, [law for law in laws if not law.needs_acting]).acting
-    for _ in range(N_ROUNDS if waits else 1):
-        own = [law.columns(m, acting) for law in laws]
-        design = np.column_stack([columns, *(column for law in laws for column in rows.of(law, acting))])
-        coefficients = _solve(design, rows.y)
-        acting = _split_drive(rows, plain, base, laws, own, coefficients)
-    left = rows.y - design @ coefficients
-    return Regression(
-        rows, tuple(laws), base, design, coefficients, left, _held_out(rows, design), acting
-    )  # fmt: skip
+        fixed = {law.key: law.columns(m, acting) for law in laws if not law.needs_acting}
+        for _ in range(N_ROUNDS - 1):
+            own = [fixed.get(law.key) or law.columns(m, acting) for law in laws]
+            acting = _split_drive(rows, plain, base, laws, own, _solve(design(acting), rows.y))
+    A = design(acting)
+    coefficients = _solve(A, rows.y)
+    left = rows.y - A @ coefficients
+    return Regression(rows, plain, tuple(laws), base, A, coefficients, left, _held_out(rows, A), acting)
 
 
 def _base(rows: Rows) -> tuple[tuple[str, ...], Array]:
