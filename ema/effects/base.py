@@ -120,6 +120,8 @@ class Effect:
         Whether it says what friction does before it slides, so that a simulation with it knows an axis that creeps.
     derived : mapping of str to function values → number
         What the sentence tells besides the parameters.
+    product : pair of str, optional
+        Parameters whose product a record tells far better than either.
     """
 
     name: str
@@ -137,13 +139,14 @@ class Effect:
     on_axis: OnAxis | None = None
     acts_at_rest: bool = False
     derived: Mapping[str, Callable[[Mapping[str, float]], float]] = field(default_factory=dict)
+    product: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
         unknown = set(self.laws) - set(HOOKS)
         if unknown:
             raise ValueError(f"effect {self.name}: unknown hooks {sorted(unknown)}; known: {sorted(HOOKS)}")
         named = {name for look in self.looks for name in (*look.linear, *look.steps, *look.at)}
-        if strange := named - {p.name for p in self.parameters}:
+        if strange := {*named, *(self.product or ())} - {p.name for p in self.parameters}:
             raise ValueError(f"effect {self.name}: a look at {sorted(strange)}, which are none of its parameters")
 
     @property

@@ -17,5 +17,6 @@ EFFECT = Effect(
     separated_by="fast motion with the angles of motor and load both measured",
     mistaken_for=("k2",),
     plants=("ema", "axis"),
+    product=("inertia", "compliance"),
     limits={"inertia": POSITIVE, **dict.fromkeys(("compliance", "damping", "drag", "friction"), NOT_NEGATIVE)},
 )

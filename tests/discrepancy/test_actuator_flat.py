@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.comparators import take_step, tell_step
 from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.fit import fit
+from ema.discrepancy.actuator.fit import fit, residuals_at, stacked_jacobian
 from ema.discrepancy.actuator.flat import settle
 from ema.discrepancy.actuator.free import K_FREE, free
+from ema.discrepancy.actuator.gear import find_resonance, start_swinging
 from ema.discrepancy.actuator.noise import Noise
 from ema.discrepancy.actuator.plant import EmaPlant
 
@@ -34,6 +36,39 @@ def test_shorts_and_gains_are_told_apart_and_the_intervals_say_how_well(hidden, 
         assert abs(found.point[name] - value) < min(OFF, 2.0 * found.sd[name])  # nearer than it began
     for name, value in K.items():
         assert 2.0 * found.sd[name] < value  # shorts are still told from none
+
+
+@pytest.mark.slow
+def test_an_inertia_behind_a_gear_that_gives_is_felt_beside_its_resonance(hidden, shipped_plant):
+    """The columns of compliance and inertia nearly cancel; their difference was ten times what a change makes."""
+    C, J, damper = 2.4e-5, 0.6, 30.0
+    cycles = hidden.cycles(hidden.Flaws(compliance=C, user_damping=damper, k2=0.02, k3=0.03), 2, 5)
+    data = prepare(shipped_plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(cycles)))])
+    gear = find_resonance(shipped_plant, data)
+    plant, every = EmaPlant(shipped_plant, start_swinging(data, gear), resonance=gear), [0, 1]
+    name = "gear_compliance.{}".format
+    start = {"k2": 0.02, "k3": 0.03, name("compliance"): C, name("inertia"): J}
+    start[name("damping")] = 0.5 * damper * np.sqrt(C / J)
+    frees = (*K_FREE, *(free(name(n), 0.15 * start[name(n)]) for n in ("compliance", "inertia", "damping")))
+    noise = Noise(plant, start)
+    found = settle(plant, noise, fit(plant, noise, frees, start, every, n_iterations=2), every)
+    assert abs(found.point[name("inertia")] - J) < max(3.0 * found.sd[name("inertia")], 0.005 * J)
+
+    def along_valley(share: float):
+        at = found.point
+        return {
+            **at,
+            name("inertia"): at[name("inertia")] * (1.0 + share),
+            name("compliance"): at[name("compliance")] / (1.0 + share),
+        }
+
+    low, high = (along_valley(share) for share in (-0.03, 0.03))
+    left = [np.concatenate([r[c] for c in every]) for r in residuals_at(plant, noise, [low, high], every, 32)]
+    made = left[0] - left[1]
+    for fitted in (fit(plant, noise, frees, found.point, every, n_iterations=1), found):
+        way = np.array([high.get(f.name, 0.0) - low.get(f.name, 0.0) for f in frees])
+        said = stacked_jacobian(noise, frees, fitted.columns, every) @ way
+        assert np.linalg.norm(said - made) < 1.2 * np.linalg.norm(made)
 
 
 @pytest.mark.further

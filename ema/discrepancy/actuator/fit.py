@@ -15,6 +15,7 @@ from ema.discrepancy.plant import Point
 
 from .free import K_STEP, Free
 from .noise import Noise, disagreement, scatter
+from .valley import hold_product, pairs, slopes, step_by_product
 
 if TYPE_CHECKING:
     from .plant import EmaPlant, Steps
@@ -31,25 +32,28 @@ SHORT = 75.0  # of a step near the end, where the curvature of the response coun
 Columns = dict[tuple[int, str], Array]  # by motion and name of the parameter; not whitened, per unit
 
 
-def column_points(point: Point, f: Free) -> tuple[Point, float]:
-    """The point one step along a parameter (inside its bounds), and the step."""
+def column_points(point: Point, f: Free, follows: str | None = None) -> tuple[Point, float]:
+    """The point one step along a parameter (inside its bounds), or along the valley of a pair, and the step."""
     x = point.get(f.name, 0.0)
     step = f.step if f.low <= x + f.step <= f.high else -f.step
-    return {**point, f.name: x + step}, step
+    moved = {**point, f.name: x + step}
+    return moved if follows is None else hold_product(point, moved, f.name, follows), step
 
 
 def columns(plant: EmaPlant, frees: Sequence[Free], point: Point, motions: Sequence[int]) -> Columns:
     """Finite-difference columns of the mean features at a point."""
     if not frees:
         return {}
-    moved = [column_points(point, f) for f in frees]
+    follows = pairs(frees)
+    moved = [column_points(point, f, follows.get(f.name)) for f in frees]
     first = [plant.first[motion] for motion in motions]
     here, *means = plant.means([point, *(p for p, _ in moved)], first, N_COLUMN, SEED)
-    return {
-        (motion, f.name): (mean[c] - here[c]) / step
-        for f, (_, step), mean in zip(frees, moved, means, strict=True)
-        for motion, c in zip(motions, first, strict=True)
-    }
+    own = np.linalg.inv(slopes(point, frees))
+    found: Columns = {}
+    for motion, c in zip(motions, first, strict=True):
+        along = np.array([(mean[c] - here[c]) / step for mean, (_, step) in zip(means, moved, strict=True)])
+        found |= {(motion, f.name): column for f, column in zip(frees, own.T @ along, strict=True)}
+    return found
 
 
 def columns_of_all(plant: EmaPlant, of: Fit) -> Columns:
@@ -161,7 +165,8 @@ def bounds(frees: Sequence[Free], point: Point) -> tuple[Array, Array]:
 
 def step_to(point: Point, frees: Sequence[Free], step: Array) -> Point:
     """The point after a step."""
-    return {**point, **{f.name: point.get(f.name, 0.0) + float(d) for f, d in zip(frees, step, strict=True)}}
+    moved = {**point, **{f.name: point.get(f.name, 0.0) + float(d) for f, d in zip(frees, step, strict=True)}}
+    return step_by_product(point, moved, frees)
 
 
 def _is_stale(f: Free, frees: Sequence[Free], point: Point, at: Point) -> bool:
@@ -211,7 +216,7 @@ def fit(
         stale = [replace(f, step=steps.get(f.name, f.step)) for f in stale]
         cols |= columns(plant, stale, point, motions)
         J = stacked_jacobian(noise, frees, cols, cycles)
-        length = np.linalg.norm(J, axis=0) / np.sqrt(len(cycles))
+        length = np.linalg.norm(J @ slopes(point, frees), axis=0) / np.sqrt(len(cycles))
         steps = {
             f.name: np.sign(f.step) * min(abs(f.step), LENGTH / max(x, 1e-300))
             for f, x in zip(frees, length, strict=True)
@@ -279,7 +284,7 @@ def _search_along(
 def refit_with_short_steps(plant: EmaPlant, noise: Noise, found: Fit, cycles: Sequence[int]) -> Fit:
     """The fit gone on with, by differences over shorter steps."""
     J = stacked_jacobian(noise, found.free, found.columns, cycles)
-    length = np.linalg.norm(J, axis=0) / np.sqrt(len(cycles))
+    length = np.linalg.norm(J @ slopes(found.point, found.free), axis=0) / np.sqrt(len(cycles))
     frees = [
         replace(f, step=float(np.sign(f.step)) * min(abs(f.step), SHORT / max(x, 1e-300)))
         for f, x in zip(found.free, length, strict=True)

@@ -5,7 +5,7 @@ cancel, their difference is noise and curvature: even the direction in which the
 directions are simulated themselves, to both sides, as far as that is clearly felt; the Jacobian learns what that shows
 [Broyden, Math. Comp. 19, 1965] and so which directions are flat; and so on from where a step leads. All is simulated
 twice with other seeds: the product of two halves has no share of noise. The scatter of the last turns is part of the
-deviations.
+deviations. The fit keeps what was learned: who weighs it by its columns knows as much of flat directions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
-from .fit import Fit, bounds, conclude, residuals_at, solve_within_bounds, stacked_jacobian, step_to
+from .fit import Columns, Fit, bounds, conclude, residuals_at, solve_within_bounds, stacked_jacobian, step_to
 from .free import Free
 from .noise import Noise
 
@@ -39,6 +39,7 @@ HARDLY = 0.2  # of FELT, by which a bound may bend a way
 # Of the noise of a cycle: by how much honest simulations of the same laws and step differ along a flat direction. The
 # likeliest for 115 deviations (`benchmarks.deviations`, other hands): 0.005 to 0.03 within two nats, 0.12 57 behind.
 UNSEEN = 0.02
+PER_KELVIN = ".per_kelvin"
 ONE_SIDED = 0.15  # share of a way inside bounds, below which the point itself is the end
 
 
@@ -95,7 +96,8 @@ def settle(plant: EmaPlant, noise: Noise, fit: Fit, cycles: Sequence[int]) -> Fi
     point = {name: float(np.mean([p[name] for p in last])) for name in point}
     left = {c: x.mean(axis=0) for c, x in _by_cycle(plant, noise, [point], cycles)[0].items()}
     parts = np.split(solution, np.cumsum([len(left[c]) for c in cycles])[:-1], axis=1)
-    found = conclude(plant, noise, fit.free, point, fit.columns, left, parts, 0.5 / N_SEEDS)
+    learned = fit.columns | _as_columns(noise, fit.free, J * scale, cycles)
+    found = conclude(plant, noise, fit.free, point, learned, left, parts, 0.5 / N_SEEDS)
     wandered = np.array([np.std([p[f.name] for p in last]) for f in fit.free])
     more = np.hypot(wandered, _estimate_unseen(noise, A * scale, len(_flat(J, FLAT)[0]), cycles))
     return replace(found, sd={name: float(np.hypot(x, y)) for (name, x), y in zip(found.sd.items(), more, strict=True)})
@@ -150,6 +152,17 @@ def _learn(J: Array, ways: Array, found: Array) -> Probed:
     first, second = (J + (back @ (found[:, half] - ways @ J.T)).T for half in (0, 1))
     shortest = float((ways**2).sum(axis=1).min())
     return Probed((first, second), float(np.sqrt(len(J))) * 2.0 / N_SEEDS / shortest)
+
+
+def _as_columns(noise: Noise, frees: Sequence[Free], J: Array, cycles: Sequence[int]) -> Columns:
+    """Columns of each motion by what its cycles have on average; but of what goes with each cycle's temperature."""
+    of_cycle = dict(zip(cycles, np.split(J, len(cycles)), strict=True))
+    found: Columns = {}
+    for motion in sorted({int(noise.plant.data.motion[c]) for c in cycles}):
+        mean = np.mean([of_cycle[c] for c in cycles if noise.plant.data.motion[c] == motion], axis=0)
+        rows = noise.motions[motion].unwhite(mean.T)
+        found |= {(motion, f.name): row for f, row in zip(frees, rows, strict=True) if not f.name.endswith(PER_KELVIN)}
+    return found
 
 
 def _system(probed: Probed, r: Array) -> tuple[Array, Array, Array]:

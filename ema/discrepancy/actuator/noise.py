@@ -55,6 +55,10 @@ class MotionNoise:
         """Whitened rows of `x`, shape (..., n_features)."""
         return self.root(x / self.sd)
 
+    def unwhite(self, x: Array) -> Array:
+        """The rows of which `white` makes `x`, shape (..., n_features)."""
+        return self.root.inverse(x) * self.sd
+
 
 def _repeats(plant: EmaPlant, motion: int, n_runs: tuple[int, int]) -> tuple[list[int], int]:
     """Cycles of a motion that are simulated for its noise, and how often each."""

@@ -71,6 +71,11 @@ class Root:
         along = x @ self.directions
         return np.asarray(self.across * x + (along * (self.along - self.across)) @ self.directions.T)
 
+    @property
+    def inverse(self) -> Root:
+        """What makes standardised rows of whitened ones."""
+        return Root(self.directions, 1.0 / self.along, 1.0 / self.across)
+
 
 @dataclass(frozen=True)
 class Whitening:

@@ -162,6 +162,7 @@ def test_the_root_of_a_correlation_whitens_as_the_whole_matrix_does():
     x, y = rng.standard_normal((2, 5, 60))
     root = Root.of(z)
     assert root(x) @ root(y).T == pytest.approx(x @ np.linalg.solve(shrunk_correlation(z), y.T), rel=1e-9)
+    assert root.inverse(root(x)) == pytest.approx(x, rel=1e-9, abs=1e-12)
     r = z.T @ z / 19
     off = ~np.eye(60, dtype=bool)
     variance = ((z**2).T @ (z**2) / 19 - r**2) / 20
