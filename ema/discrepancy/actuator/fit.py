@@ -44,11 +44,12 @@ def columns(plant: EmaPlant, frees: Sequence[Free], point: Point, motions: Seque
     """Finite-difference columns of the mean features at a point."""
     if not frees:
         return {}
-    follows = pairs(frees)
+    names = [f.name for f in frees]
+    follows = pairs(names)
     moved = [column_points(point, f, follows.get(f.name)) for f in frees]
     first = [plant.first[motion] for motion in motions]
     here, *means = plant.means([point, *(p for p, _ in moved)], first, N_COLUMN, SEED)
-    own = np.linalg.inv(slopes(point, frees))
+    own = np.linalg.inv(slopes(point, names))
     found: Columns = {}
     for motion, c in zip(motions, first, strict=True):
         along = np.array([(mean[c] - here[c]) / step for mean, (_, step) in zip(means, moved, strict=True)])
@@ -166,7 +167,10 @@ def bounds(frees: Sequence[Free], point: Point) -> tuple[Array, Array]:
 def step_to(point: Point, frees: Sequence[Free], step: Array) -> Point:
     """The point after a step."""
     moved = {**point, **{f.name: point.get(f.name, 0.0) + float(d) for f, d in zip(frees, step, strict=True)}}
-    return step_by_product(point, moved, frees)
+    names = [f.name for f in frees]
+    found = step_by_product(point, moved, names)
+    follow = set(pairs(names).values())
+    return found | {f.name: float(np.clip(found[f.name], f.low, f.high)) for f in frees if f.name in follow}
 
 
 def _is_stale(f: Free, frees: Sequence[Free], point: Point, at: Point) -> bool:
@@ -216,7 +220,7 @@ def fit(
         stale = [replace(f, step=steps.get(f.name, f.step)) for f in stale]
         cols |= columns(plant, stale, point, motions)
         J = stacked_jacobian(noise, frees, cols, cycles)
-        length = np.linalg.norm(J @ slopes(point, frees), axis=0) / np.sqrt(len(cycles))
+        length = np.linalg.norm(J @ slopes(point, [f.name for f in frees]), axis=0) / np.sqrt(len(cycles))
         steps = {
             f.name: np.sign(f.step) * min(abs(f.step), LENGTH / max(x, 1e-300))
             for f, x in zip(frees, length, strict=True)
@@ -284,7 +288,7 @@ def _search_along(
 def refit_with_short_steps(plant: EmaPlant, noise: Noise, found: Fit, cycles: Sequence[int]) -> Fit:
     """The fit gone on with, by differences over shorter steps."""
     J = stacked_jacobian(noise, found.free, found.columns, cycles)
-    length = np.linalg.norm(J @ slopes(found.point, found.free), axis=0) / np.sqrt(len(cycles))
+    length = np.linalg.norm(J @ slopes(found.point, [f.name for f in found.free]), axis=0) / np.sqrt(len(cycles))
     frees = [
         replace(f, step=float(np.sign(f.step)) * min(abs(f.step), SHORT / max(x, 1e-300)))
         for f, x in zip(found.free, length, strict=True)
