@@ -146,8 +146,11 @@ class Effect:
         if unknown:
             raise ValueError(f"effect {self.name}: unknown hooks {sorted(unknown)}; known: {sorted(HOOKS)}")
         named = {name for look in self.looks for name in (*look.linear, *look.steps, *look.at)}
-        if strange := {*named, *(self.product or ())} - {p.name for p in self.parameters}:
+        parameters = {p.name for p in self.parameters}
+        if strange := named - parameters:
             raise ValueError(f"effect {self.name}: a look at {sorted(strange)}, which are none of its parameters")
+        if strange := {*(self.product or ())} - parameters:
+            raise ValueError(f"effect {self.name}: a product of {sorted(strange)}, which are none of its parameters")
 
     @property
     def multiplies_friction(self) -> bool:

@@ -12,7 +12,7 @@ from ema.discrepancy.engine.contest import EXPANSIONS, Contest, Entrant, Outcome
 from ema.discrepancy.engine.statistic import Whitening
 
 from .fit import columns
-from .free import K_FREE, Free
+from .free import K_FREE, Free, goes_with_temperature
 from .model import Model
 from .noise import SEED, Noise
 from .problem import ActuatorProblem, as_cause
@@ -114,7 +114,7 @@ def _column(search: Search, known: dict[tuple[int, str], Array], name: str) -> A
     for c in range(data.n_cycles):
         motion = int(data.motion[c])
         dT = data.dT[first[motion]]
-        share = 1.0 if not name.endswith(".per_kelvin") else data.dT[c] / dT if dT else 0.0
+        share = 1.0 if not goes_with_temperature(name) else data.dT[c] / dT if dT else 0.0
         parts.append(share * known[motion, name])
     return np.concatenate(parts)
 

@@ -13,7 +13,7 @@ from ema.core.names import FAULTS
 from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
-from .free import K_STEP, Free
+from .free import K_STEP, Free, goes_with_temperature
 from .noise import Noise, disagreement, scatter
 from .valley import hold_product, pairs, slopes, step_by_product
 
@@ -140,7 +140,7 @@ def stacked_jacobian(noise: Noise, frees: Sequence[Free], cols: Columns, cycles:
         m: noise.motions[m].white(np.array([cols[m, f.name] for f in frees])).T
         for m in sorted({int(data.motion[c]) for c in cycles})
     }
-    per_kelvin = np.array([f.name.endswith(".per_kelvin") for f in frees])
+    per_kelvin = np.array([goes_with_temperature(f.name) for f in frees])
 
     def at(cycle: int) -> Array:
         motion = int(data.motion[cycle])
@@ -167,10 +167,8 @@ def bounds(frees: Sequence[Free], point: Point) -> tuple[Array, Array]:
 def step_to(point: Point, frees: Sequence[Free], step: Array) -> Point:
     """The point after a step."""
     moved = {**point, **{f.name: point.get(f.name, 0.0) + float(d) for f, d in zip(frees, step, strict=True)}}
-    names = [f.name for f in frees]
-    found = step_by_product(point, moved, names)
-    follow = set(pairs(names).values())
-    return found | {f.name: float(np.clip(found[f.name], f.low, f.high)) for f in frees if f.name in follow}
+    follow = step_by_product(point, moved, [f.name for f in frees])
+    return moved | {f.name: float(np.clip(follow[f.name], f.low, f.high)) for f in frees if f.name in follow}
 
 
 def _is_stale(f: Free, frees: Sequence[Free], point: Point, at: Point) -> bool:
@@ -220,7 +218,7 @@ def fit(
         stale = [replace(f, step=steps.get(f.name, f.step)) for f in stale]
         cols |= columns(plant, stale, point, motions)
         J = stacked_jacobian(noise, frees, cols, cycles)
-        length = np.linalg.norm(J @ slopes(point, [f.name for f in frees]), axis=0) / np.sqrt(len(cycles))
+        length = _lengths_along_valleys(J, frees, point) / np.sqrt(len(cycles))
         steps = {
             f.name: np.sign(f.step) * min(abs(f.step), LENGTH / max(x, 1e-300))
             for f, x in zip(frees, length, strict=True)
@@ -288,7 +286,7 @@ def _search_along(
 def refit_with_short_steps(plant: EmaPlant, noise: Noise, found: Fit, cycles: Sequence[int]) -> Fit:
     """The fit gone on with, by differences over shorter steps."""
     J = stacked_jacobian(noise, found.free, found.columns, cycles)
-    length = np.linalg.norm(J @ slopes(found.point, [f.name for f in found.free]), axis=0) / np.sqrt(len(cycles))
+    length = _lengths_along_valleys(J, found.free, found.point) / np.sqrt(len(cycles))
     frees = [
         replace(f, step=float(np.sign(f.step)) * min(abs(f.step), SHORT / max(x, 1e-300)))
         for f, x in zip(found.free, length, strict=True)
@@ -320,6 +318,11 @@ def conclude(
     random = (1.0 + extra) * max(misfit, 1.0) * scatter(noise, solution, cycles)
     sd = np.sqrt(np.maximum(np.diag(random), np.diag(disagreement(plant.data, solution, found, cycles))))
     return Fit(point, tuple(frees), cols, res, misfit, dict(zip((f.name for f in frees), sd.tolist(), strict=True)))
+
+
+def _lengths_along_valleys(J: Array, frees: Sequence[Free], point: Point) -> Array:
+    """What a step of each parameter makes of the features per unit, as differences are taken."""
+    return np.asarray(np.linalg.norm(J @ slopes(point, [f.name for f in frees]), axis=0))
 
 
 def _lengths(J: Array) -> Array:

@@ -20,7 +20,7 @@ from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
 from .fit import Columns, Fit, bounds, conclude, residuals_at, solve_within_bounds, stacked_jacobian, step_to
-from .free import Free
+from .free import Free, goes_with_temperature
 from .noise import Noise
 
 if TYPE_CHECKING:
@@ -39,7 +39,6 @@ HARDLY = 0.2  # of FELT, by which a bound may bend a way
 # Of the noise of a cycle: by how much honest simulations of the same laws and step differ along a flat direction. The
 # likeliest for 115 deviations (`benchmarks.deviations`, other hands): 0.005 to 0.03 within two nats, 0.12 57 behind.
 UNSEEN = 0.02
-PER_KELVIN = ".per_kelvin"
 ONE_SIDED = 0.15  # share of a way inside bounds, below which the point itself is the end
 
 
@@ -161,7 +160,9 @@ def _as_columns(noise: Noise, frees: Sequence[Free], J: Array, cycles: Sequence[
     for motion in sorted({int(noise.plant.data.motion[c]) for c in cycles}):
         mean = np.mean([of_cycle[c] for c in cycles if noise.plant.data.motion[c] == motion], axis=0)
         rows = noise.motions[motion].unwhite(mean.T)
-        found |= {(motion, f.name): row for f, row in zip(frees, rows, strict=True) if not f.name.endswith(PER_KELVIN)}
+        found |= {
+            (motion, f.name): row for f, row in zip(frees, rows, strict=True) if not goes_with_temperature(f.name)
+        }
     return found
 
 

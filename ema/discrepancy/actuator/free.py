@@ -20,6 +20,11 @@ class Free:
     step: float
 
 
+def goes_with_temperature(name: str) -> bool:
+    """Whether a parameter acts in proportion to each cycle's temperature."""
+    return name.endswith(".per_kelvin")
+
+
 K_FREE = tuple(Free(name, 0.0, 1.0, K_STEP) for name in FAULTS)
 
 

@@ -31,10 +31,10 @@ class Size:
 def deviation(name: str, score: float, model: Model, outcome: Outcome) -> float:
     """Standard deviation of a parameter: the wider of the `score`'s and the fit's, less the doubt about dropped faults.
 
-    The score knows no simulation but its own, and by itself claims 0.02 % of a compliance that another simulation has
-    0.6 % off; the fit knows how motions and honest simulations scatter, but keeps faults free that the score has
-    dropped. So the fit's counts by as much as the score's is smaller than beside all that the fit has free: where a
-    weaker magnet is alone for certain, its size does not share the doubt about three shorts beside it.
+    The score knows no simulation but its own; the fit knows how motions and honest simulations scatter, but keeps
+    faults free that the score has dropped. So the fit's counts by as much as the score's is smaller than beside all
+    that the fit has free: where a weaker magnet is alone for certain, its size does not share the doubt about three
+    shorts beside it.
     """
     own, fit = _weighed(model, outcome), model.fit.sd.get(name, 0.0)
     if own is None or name not in own.sd:

@@ -35,8 +35,8 @@ def hold_product(point: Values, moved: Values, along: str, follows: str) -> dict
 
 
 def step_by_product(point: Values, moved: Values, names: Sequence[str]) -> dict[str, float]:
-    """`moved` with that product of each pair which first order says, instead of the product of two steps."""
-    found = dict(moved)
+    """What follows after a step, so that each pair has the product of first order, and not that of two steps."""
+    found = {}
     for along, follows in pairs(names).items():
         x, y = (point.get(name, 0.0) for name in (along, follows))
         found[follows] = (x * y + x * (moved[follows] - y) + y * (moved[along] - x)) / moved[along]
