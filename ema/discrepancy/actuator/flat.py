@@ -155,7 +155,8 @@ def _learn(J: Array, ways: Array, found: Array) -> Probed:
 
 def _as_columns(noise: Noise, frees: Sequence[Free], J: Array, cycles: Sequence[int]) -> Columns:
     """Columns of each motion by what its cycles have on average; but of what goes with each cycle's temperature."""
-    of_cycle = dict(zip(cycles, np.split(J, len(cycles)), strict=True))
+    ends = np.cumsum([len(noise.of(c).sd) for c in cycles])  # motions may differ in how many features they have
+    of_cycle = dict(zip(cycles, np.split(J, ends[:-1]), strict=True))
     found: Columns = {}
     for motion in sorted({int(noise.plant.data.motion[c]) for c in cycles}):
         mean = np.mean([of_cycle[c] for c in cycles if noise.plant.data.motion[c] == motion], axis=0)
