@@ -136,3 +136,14 @@ def test_what_bends_a_torque_without_a_name_is_no_cause_of_its_own(support, seed
     found = plant.balance
     sure = {term.law.name for term in found.terms if found.of_set(term) >= 0.5}
     assert sure <= {"position_torque", "spring_load", "stiffening_spring"}
+
+
+@pytest.mark.parametrize("seed", [6, 7, 8])
+def test_what_bends_a_drag_that_blows_one_way_is_no_sure_cause(support, seed):
+    """A fan's drag has no law here; beside one by direction a constant load, or a Stribeck curve, takes what it bends."""
+    strange = support("strange")
+    axis = strange.Axis()
+    plant = AxisPlant(RotaryAxis.model_validate(strange.plant(axis)), [strange.record("one_way_fan", axis, seed)])
+    sure = {term.law.name for term in plant.balance.terms if plant.balance.of_set(term) >= 0.9}
+    assert sure <= {"viscous_by_direction", "quadratic_drag"}
+    assert sure

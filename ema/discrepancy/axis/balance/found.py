@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.records import Array
-from ema.discrepancy.plant import FORM
 
+from .form import made_by_form
 from .law import BY_RECORD
 
 if TYPE_CHECKING:
@@ -95,24 +95,11 @@ class Balance:
     def confidence(self, term: Term) -> float:
         """How often the law wins, times its mark over that and what it may have been taken for.
 
-        That is of the rest, and of what has no name, whose form the library has not. What records contradict each other
-        in counts against it.
+        That is of the rest, and of the form of other laws. What records contradict each other in counts against it.
         """
-        rest = term.common * max(self.left - self.noise, 0.0) + self._made_by_form(term)
+        rest = term.common * max(self.left - self.noise, 0.0) + made_by_form(self, term)
         sure = term.wins * term.power / (term.power + rest) if term.power > 0.0 else 0.0
         return sure * self._agreed(term.law)
-
-    def _made_by_form(self, term: Term) -> float:
-        """Mean square of what looks like this law and may be the form of those that have no name. [N² m² or N²]"""
-        made, acting = self.model.rows.motion, self.model.acting
-        own = np.stack(term.law.columns(made, acting), axis=1) @ self.corrected.coefficients[self.model.part(term.law)]
-        out = 0.0
-        for other in self.terms:
-            if other is not term and other.law.freer is not None:
-                freer = np.stack(other.law.freer(made, acting), axis=1)
-                rest = own - freer @ np.linalg.lstsq(freer, own, rcond=None)[0]
-                out += FORM**2 * other.power * (1.0 - float(rest @ rest) / max(float(own @ own), 1e-300))
-        return out
 
     def _agreed(self, law: Law) -> float:
         """Factor on the confidence of a law by what records say of it: 1 where they agree, or may differ."""
