@@ -45,7 +45,9 @@ def ends(row: dict[str, Any], values: dict[str, float]) -> tuple[Point, Point]:
 @click.option("--number", default=0, show_default=True)
 def main(rows: Path, stratum: str, number: int) -> None:
     """Print the pulls on one trial's record."""
-    row = next(r for r in read_rows(rows) if (r["stratum"], r["number"]) == (stratum, number))
+    row = next((r for r in read_rows(rows) if (r["stratum"], r["number"]) == (stratum, number)), None)
+    if row is None or not row.get("parameter_errors"):
+        raise click.UsageError(f"{rows}: {stratum} {number}: " + ("no such row" if row is None else "nothing was told"))
     t = strata.drawn(stratum, number, row["seed"])
     data = prepare(t.actuator, [recorded(t.values, t.k, t.n_cycles, bench_seed(row["seed"]), t.motions, t.bench)])
     plant = EmaPlant(take_recorded_conditions(t.actuator, data.signals)[0], data, 1)

@@ -31,18 +31,11 @@ def som(know: Knowledge, n: int, seed: int) -> np.ndarray:
     """The paper's: a chain of n neurons trained on T = [v₁, t]; their time components are the sampling times.
 
     Both components are scaled to unit range. Inverse decay of learning rate and radius: the default decay leaves the
-    map a fifth coarser (see `quantisation_error`).
+    map a fifth coarser (mean distance of the data from their neuron).
     """
     neurons = _train(know, n, seed)
     index = np.searchsorted(know.t, np.sort(neurons[:, 1]) * know.t[-1])
     return _distinct(index, len(know.t))
-
-
-def quantisation_error(know: Knowledge, n: int, seed: int) -> float:
-    """Mean distance of the SOM's data from their neuron, both components scaled to unit range."""
-    data = _scaled(know)
-    neurons = _train(know, n, seed)
-    return float(np.mean(np.min(np.linalg.norm(data[:, None, :] - neurons[None], axis=2), axis=1)))
 
 
 def uniform(know: Knowledge, n: int, seed: int) -> np.ndarray:

@@ -140,7 +140,7 @@ def test_what_bends_a_torque_without_a_name_is_no_cause_of_its_own(support, seed
 
 @pytest.mark.parametrize("seed", [6, 7, 8])
 def test_what_bends_a_drag_that_blows_one_way_is_no_sure_cause(support, seed):
-    """A fan's drag has no law here; beside one by direction a constant load, or a Stribeck curve, takes what it bends."""
+    """A fan's drag has no law here: a constant load or a Stribeck curve takes what one by direction leaves of it."""
     strange = support("strange")
     axis = strange.Axis()
     plant = AxisPlant(RotaryAxis.model_validate(strange.plant(axis)), [strange.record("one_way_fan", axis, seed)])
