@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.records import Array
-from ema.discrepancy.plant import FORM
 
 if TYPE_CHECKING:
     from .found import Balance, Term
@@ -15,18 +14,18 @@ if TYPE_CHECKING:
 LEAST = 1e-9  # of what is left by a law that stands for all of another's form: it may leave nothing
 
 
-def made_by_form(b: Balance, term: Term) -> float:
+def made_by_form(b: Balance, term: Term, inexact: float) -> float:
     """Mean square of what looks like `term` and may be the form of the balance's other laws. [N² m² or N²]
 
-    Of each as much as looks like it, and no more than what is left allows: were the law a stand-in for a share s of
-    another's form, the share 1 - s would be left.
+    Laws are `inexact` by that much of what they do. Of each as much as looks like the law, and no more than what is
+    left allows: were it a stand-in for a share s of another's form, the share 1 - s would be left.
     """
     own, left, out = _beside_others(b, term), max(b.left - b.noise, 0.0), 0.0
     for other in b.terms:
         if other is not term:
             s = _share_by_polynomials(b, term, other) if other.law.freer else _share_by_block(b, own, other)
             allowed = np.inf if other.law.freer else left / max(1.0 - s, LEAST)
-            out += s * min(FORM**2 * other.power, allowed)
+            out += s * min(inexact**2 * other.power, allowed)
     return out
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.records import Array
+from ema.discrepancy.plant import FORM
 
 from .form import made_by_form
 from .law import BY_RECORD
@@ -97,7 +98,7 @@ class Balance:
 
         That is of the rest, and of the form of other laws. What records contradict each other in counts against it.
         """
-        rest = term.common * max(self.left - self.noise, 0.0) + made_by_form(self, term)
+        rest = term.common * max(self.left - self.noise, 0.0) + made_by_form(self, term, FORM)
         sure = term.wins * term.power / (term.power + rest) if term.power > 0.0 else 0.0
         return sure * self._agreed(term.law)
 
