@@ -3,12 +3,13 @@
 A resonance is no small change of anything, so no finite difference points at it. But with the measured rotor as input,
 the user behind a spring is a small model of its own,
 
-    J_u dω_u/dt = K δ + 2 ζ √(K J_u) (ω_m/GR - ω_u) - C_u ω_u - friction(F_u),   δ = deflection(θ_u, θ_m/GR, b)
+    J_u dω_u/dt = K (δ - σ θ_u) + 2 ζ √(K J_u) (ω_m/GR - ω_u) - C_u ω_u - friction(F_u),
+    δ = deflection(θ_u, θ_m/GR, b)
 
-(the damper acts where the gap is closed), in which only K/J_u, ζ, C_u/J_u and F_u/J_u matter for θ_u; the torque
-balance of the motor, which accelerates J_u too, then tells J_u. Drag and friction at the user are left out where they
-make little difference, and so is a reading of θ_u that is late: what turns the phase alone is no drag, which takes from
-the swing too.
+(the damper acts where the gap is closed), in which only K/J_u, ζ, C_u/J_u, F_u/J_u and σ matter for θ_u; the torque
+balance of the motor, which accelerates J_u too, then tells J_u. Drag, friction and a spring at the user are left out
+where they make little difference, and so is a reading of θ_u that is late: what turns the phase alone is no drag, which
+takes from the swing too. A spring twists the gear by more than the resonance does in slow motion.
 """
 
 from __future__ import annotations
@@ -45,8 +46,11 @@ FREQUENCIES = np.geomspace(100.0, 2000.0, 32)  # [rad/s]
 DAMPINGS = (0.01, 0.03, 0.1, 0.3)
 WIDER = (1.0, 4.0)  # times the nominal backlash
 LEAST_PLAY = 1e-8  # [rad at the user] less is none
-NONE = (0.0, 0.0, 0.0)  # C_u/J_u [1/s], F_u/J_u [rad/s²] and how late θ_u is read [samples] to begin with
-BESIDE = ((30.0, 1e-3, 0.0), (30.0, 5.0, 0.0), (0.0, 0.0, 2.0), (0.0, 0.0, 10.0))  # where these are asked for
+NONE = (0.0, 0.0, 0.0, 0.0)  # C_u/J_u [1/s], F_u/J_u [rad/s²], how late θ_u is read [samples] and σ to begin with
+BESIDE = (  # where these are asked for
+    *((30.0, 1e-3, 0.0, 0.0), (30.0, 5.0, 0.0, 0.0), (0.0, 0.0, 2.0, 0.0), (0.0, 0.0, 10.0, 0.0)),
+    *((0.0, 0.0, 0.0, 0.01), (0.0, 0.0, 0.0, 0.06), (30.0, 1e-3, 0.0, 0.01)),
+)
 LOUD = 3.0  # times the noise of θ_u, from where what a gear alone leaves is asked for one of these beside it
 CLEAR = 0.7  # share of the squared gap's change from which a resonance is worth simulating
 CLEARER = 0.2  # of what play or a gear alone leaves, where one of these is asked for
@@ -79,7 +83,7 @@ class Resonance(NamedTuple):
 class Gear(NamedTuple):
     """What θ_u tells of a gear that gives: √(K/J_u) [rad/s], ζ, b [rad], C_u/J_u [1/s], F_u/J_u [rad/s²].
 
-    `late` is by how much θ_u is read late. [samples]
+    `late` is by how much θ_u is read late [samples], `spring` the stiffness of a spring at the user over K.
     """
 
     w_0: float
@@ -88,6 +92,7 @@ class Gear(NamedTuple):
     drag: float = 0.0
     friction: float = 0.0
     late: float = 0.0
+    spring: float = 0.0
 
     @property
     def rings(self) -> bool:
@@ -98,7 +103,7 @@ class Gear(NamedTuple):
 @njit(cache=True, nogil=True)
 def _user(shaft: Array, start: Array, gear: Gear, T: float) -> Array:
     """θ_u of a user behind a spring, driven by θ_m/GR; `start`: its θ_u and ω_u. [rad]"""
-    w_0, zeta, b, drag, friction, _ = gear
+    w_0, zeta, b, drag, friction, _, spring = gear
     theta, w = start[0], start[1]
     out = np.empty(len(shaft))
     out[0] = theta
@@ -107,7 +112,7 @@ def _user(shaft: Array, start: Array, gear: Gear, T: float) -> Array:
         w_shaft = (shaft[t] - shaft[t - 1]) / T
         for n in range(N_SUBSTEPS):
             twist = deflection(theta, shaft[t - 1] + (n + 0.5) * dt * w_shaft, b)
-            push = w_0 * w_0 * twist - drag * w
+            push = w_0 * w_0 * (twist - spring * theta) - drag * w
             if twist != 0.0:
                 push += 2.0 * zeta * w_0 * (w_shaft - w)
             w = rubbing_speed_after(w, push, friction, dt)
@@ -147,7 +152,8 @@ def find_resonance(plant: Actuator, data: Measured) -> Resonance | None:
     if found is None:
         return None
     gear, starts, _ = found
-    inertia = _inertia(plant, data, [_user(s, start, gear, T) for s, start in zip(shafts, starts, strict=True)])
+    swinging = [_user(s, start, gear, T) for s, start in zip(shafts, starts, strict=True)]
+    inertia = _inertia(plant, data, swinging, sprung=gear.spring > 0.0)
     nominal = plant.transmission.b
     k2 = (gear.b / nominal - 1.0) / (backlash(1.0, 1.0) - 1.0) if nominal > LEAST_PLAY else 0.0
     return Resonance(
@@ -172,7 +178,7 @@ def _gear(
     shafts: list[Array],
     users: list[Array],
     data: Measured,
-    beside: tuple[float, float, float],
+    beside: tuple[float, float, float, float],
     least: float,
 ) -> tuple[Gear, Array, float] | None:
     """A gear and the starts of its user (n_cycles, 2), which leave that much of θ_u, begun with what is `beside` it.
@@ -221,8 +227,8 @@ def _fit_start(shaft: Array, user: Array, start: Array, gear: Gear, T: float) ->
     return np.asarray(solved.x)
 
 
-def _inertia(plant: Actuator, data: Measured, users: list[Array]) -> float:
-    """Inertia at the user that closes the motor's torque balance beside friction. [kg m²]"""
+def _inertia(plant: Actuator, data: Measured, users: list[Array], *, sprung: bool) -> float:
+    """Inertia at the user that closes the motor's torque balance beside friction, and beside a spring. [kg m²]"""
     T = 1.0 / plant.control.rate
     A, y = [], []
     for s, user in zip(data.signals, users, strict=False):
@@ -234,9 +240,10 @@ def _inertia(plant: Actuator, data: Measured, users: list[Array]) -> float:
         signs, speed = local_mean(np.tanh(w_m / 2.0), m), local_mean(w_m, m)
         a_u = acceleration(user, m, T)
         moving = np.abs(speed) > MOVING
-        A.append(np.stack([a_u / plant.transmission.GR, signs, speed, tau, np.ones_like(tau)])[:, moving])
+        beside = [signs, speed, tau, np.ones_like(tau), *([local_mean(user, m)] if sprung else [])]
+        A.append(np.stack([a_u / plant.transmission.GR, *beside])[:, moving])
         y.append(load_torque(plant, motor, theta_m, m)[moving])
-    A.append(np.array([[0.0, 0.0, 0.0, REST / SCALE, 0.0]]).T)
+    A.append(np.eye(len(A[0]))[:, 3:4] * REST / SCALE)
     y.append(np.zeros(1))
     coefficients, *_ = np.linalg.lstsq(np.concatenate(A, axis=1).T, np.concatenate(y), rcond=1e-9)
     return float(np.clip(coefficients[0], *INERTIAS))

@@ -1,4 +1,4 @@
-"""A gear that gives, of which the user's position is read late: what only turns the phase is no drag.
+"""A gear that gives, of which the user's position is read late or held by a spring: neither is drag or stiffness.
 
 The records are of the tests' own simulation, which shares no code with the library.
 """
@@ -31,3 +31,18 @@ def test_its_resonance_is_found_as_it_is_however_late_it_is_read(late):
     assert found.damping == pytest.approx(RATIO, rel=0.1)
     assert found.drag < 1.0  # [N m s/rad]; half of the damper's, or more, where the delay was taken for it
     assert found.friction < 0.1  # [N m]
+
+
+@pytest.mark.parametrize("beside", [{}, {"user_drag": 10.0}, {"k2": 0.05}])
+def test_its_resonance_is_found_though_a_spring_holds_the_user(beside):
+    """A spring twists the gear more than it rings: without one in mind no resonance was seen."""
+    spring = 4000.0 if beside.get("k2") else 1500.0
+    flaws = hidden.Flaws(compliance=1.5e-5, user_inertia=INERTIA, user_damping=DAMPER, spring=spring, **beside)
+    made = hidden.cycles(flaws, 3, 2, (hidden.chirp(),), hidden.Bench())
+    plant = config.load(resources.config("actuator.yaml"), Actuator)
+    found = find_resonance(plant, prepare(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))]))
+    assert found is not None
+    assert found.compliance * found.inertia == pytest.approx(1.5e-5 * INERTIA, rel=0.02)
+    assert found.inertia == pytest.approx(INERTIA, rel=0.05)
+    assert found.drag == pytest.approx(beside.get("user_drag", 0.0), abs=1.0)
+    assert found.k2 == pytest.approx(beside.get("k2", 0.0), abs=0.003)
