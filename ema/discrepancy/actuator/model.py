@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ema.core.names import FAULTS
+
+from .free import K_FREE
+
 if TYPE_CHECKING:
     from ema.discrepancy.plant import Point
 
@@ -62,3 +66,9 @@ def strip(model: Model, effect: Candidate) -> tuple[tuple[Candidate, ...], tuple
     point = {name: x for name, x in model.fit.point.items() if not name.startswith(f"{effect.effect}.")}
     effects = tuple(c for c in model.effects if c != effect)
     return effects, tuple(f for f in model.fit.free if f.name not in own), point
+
+
+def free_again(frees: tuple[Free, ...], effect: Candidate) -> tuple[Free, ...]:
+    """Free parameters with the faults that `effect` may have stood for: a model with it may do without them."""
+    there = {f.name for f in frees} | set(effect.faults)
+    return (*(f for f in K_FREE if f.name in there), *(f for f in frees if f.name not in FAULTS))

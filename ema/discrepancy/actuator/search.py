@@ -15,7 +15,7 @@ from .candidates import Candidate
 from .fit import N_SEEDS, SEED, Columns, Fit, columns_of_all, fit, refit_with_short_steps, residuals, residuals_at
 from .flat import settle
 from .free import K_FREE, Free
-from .model import FAR, FINAL_SEED, N_FINAL, N_GLANCE, Model, strip
+from .model import FAR, FINAL_SEED, N_FINAL, N_GLANCE, Model, free_again, strip
 from .noise import Noise, Verdict, judge
 from .plant import EmaPlant, Steps
 from .weak import Torque, torque
@@ -119,14 +119,15 @@ class Search:
     def without(self, model: Model, effect: Candidate, to_beat: float = np.inf) -> Model:
         """The model fitted anew without one of its effects."""
         effects, frees, point = strip(model, effect)
-        return self.model(effects, frees, point, model.fit.columns, 3, to_beat)
+        return self.model(effects, free_again(frees, effect), point, model.fit.columns, 3, to_beat)
 
     def instead(self, model: Model, effect: Candidate, rival: Model) -> Model:
         """The model fitted anew with the last effect of `rival` in the place of one of its own."""
         effects, frees, point = strip(model, effect)
         c = rival.effects[-1]
         start = {name: x for name, x in rival.fit.point.items() if name.startswith(f"{c.effect}.")}
-        return self.model((*effects, c), (*frees, *c.frees), {**point, **start}, None, 4)
+        frees = (*free_again(frees, effect), *c.frees)
+        return self.model((*effects, c), frees, {**point, **start}, None, 4)
 
     def better(self, starts: Sequence[Point], model: Model) -> tuple[Point, float]:
         """The start that simulates closest to the training cycles, and its cost."""
