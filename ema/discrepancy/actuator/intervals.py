@@ -44,11 +44,12 @@ def deviation(name: str, score: float, model: Model, outcome: Outcome) -> float:
 
 
 def of_faults(model: Model, outcome: Outcome) -> dict[str, Size]:
-    """Faults by the score, which drops those that are not there; by the fit where the set was not weighed."""
+    """Faults by the score, which drops those that are not there, over all sets; by the fit where none was weighed."""
     own = _weighed(model, outcome)
     if own is None:
         return {name: Size(model.fit.point.get(name, 0.0), model.fit.sd.get(name, 0.0)) for name in FAULTS}
-    return {name: Size(own.point[name], deviation(name, own.sd[name], model, outcome)) for name in FAULTS}
+    sizes = outcome.sizes_of_faults(FAULTS)
+    return {name: Size(value, deviation(name, sd, model, outcome)) for name, (value, sd) in sizes.items()}
 
 
 def hold_rest(search: Search, model: Model, faults: Mapping[str, Size]) -> dict[str, Size]:

@@ -6,7 +6,7 @@ are the statistics, the same for all; so are whitening and law error.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -105,21 +105,24 @@ class Outcome:
 
         KeyError where no set has it.
         """
-        p = {entry.causes: entry.probability for entry in self.posterior}
         having = [w for w in self.weighed if cause in w.entrant.names]
         if not having:
             raise KeyError(cause)
-        found = {}
-        for name in dict.fromkeys(
-            q.name for w in having for c in w.entrant.causes if c.name == cause for q in c.parameters
-        ):
-            free = [w for w in having if name in w.point]
-            weight = np.array([p[w.entrant.names] for w in free])
-            weight = weight / weight.sum() if weight.sum() > 0.0 else np.eye(len(free))[0]
-            mean, sd = np.array([(w.point[name], w.sd[name]) for w in free]).T
-            expected = float(weight @ mean)
-            found[name] = expected, float(np.sqrt(weight @ (sd**2 + (mean - expected) ** 2)))
-        return found
+        names = (q.name for w in having for c in w.entrant.causes if c.name == cause for q in c.parameters)
+        return {name: self._size(name, having) for name in dict.fromkeys(names)}
+
+    def sizes_of_faults(self, faults: Iterable[str]) -> dict[str, tuple[float, float]]:
+        """Mean and standard deviation of each fault over all sets: where one is less with a cause, it may be more."""
+        return {name: self._size(name, self.weighed) for name in faults}
+
+    def _size(self, name: str, having: Sequence[Weighed]) -> tuple[float, float]:
+        p = {entry.causes: entry.probability for entry in self.posterior}
+        free = [w for w in having if name in w.point]
+        weight = np.array([p[w.entrant.names] for w in free])
+        weight = weight / weight.sum() if weight.sum() > 0.0 else np.eye(len(free))[0]
+        mean, sd = np.array([(w.point[name], w.sd[name]) for w in free]).T
+        expected = float(weight @ mean)
+        return expected, float(np.sqrt(weight @ (sd**2 + (mean - expected) ** 2)))
 
 
 class Contest:

@@ -27,7 +27,9 @@ def outcome():
         entrant=SimpleNamespace(names=()), sd=dict.fromkeys(FAULTS, SCORE),
         point=dict.fromkeys(FAULTS, 0.0) | {"k1": 0.03}, sd_beside=lambda free: dict.fromkeys(free, BESIDE),
     )  # fmt: skip
-    return SimpleNamespace(weighed=[w])
+    return SimpleNamespace(
+        weighed=[w], sizes_of_faults=lambda faults: {name: (w.point[name], w.sd[name]) for name in faults}
+    )
 
 
 def test_a_deviation_is_the_fits_less_the_doubt_about_faults_that_the_score_has_dropped(model, outcome):

@@ -7,7 +7,7 @@ import pytest
 from ema.discrepancy.actuator.candidates import Candidate
 from ema.discrepancy.actuator.fit import Fit
 from ema.discrepancy.actuator.free import K_FREE, free
-from ema.discrepancy.actuator.model import Model, strip
+from ema.discrepancy.actuator.model import Model, free_again, strip
 from ema.discrepancy.actuator.weighing import is_alike, is_credible, is_enough
 
 
@@ -43,6 +43,13 @@ def test_an_effect_is_taken_out_with_its_parameters_and_no_other():
     assert effects == (DRAG,)
     assert point == {"viscous_drag.coefficient": 1e-5, "k1": 0.02}
     assert [f.name for f in frees] == [*(f.name for f in K_FREE), "viscous_drag.coefficient"]
+
+
+def test_faults_that_an_effect_stood_for_are_free_again_without_it():
+    """Of a set without the magnet, fitted without one of the shorts that it did for, nothing could come near."""
+    without = [f for f in (*K_FREE, *DRAG.frees) if f.name != "k5"]
+    assert free_again(tuple(without), FLUX) == (*K_FREE, *DRAG.frees)
+    assert free_again(tuple(without), DRAG) == tuple(without)
 
 
 def test_an_effect_at_the_end_of_what_is_credible_is_no_cause_but_at_nothing_it_is():

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from ema.discrepancy.engine.contest import Contest, Entrant, Outcome
-from ema.discrepancy.engine.posterior import p_cause
+from ema.discrepancy.engine.posterior import Entry, p_cause
 from ema.discrepancy.engine.records import OwnRecordsError, Pool, seeds, simulate
 from ema.discrepancy.engine.statistic import Prediction, Root, Statistic, shrinkage, shrunk_correlation
 
 NAMES = ("a", "b", "c")
+SETS = (("magnet",), 0.03), ((), 0.07), (("drag",), 0.9)  # a short in each
 
 
 def entrant(toy, *causes: str, **point: float) -> Entrant:
@@ -106,6 +109,15 @@ def test_a_size_is_told_over_all_sets_that_have_the_cause(toys):
     assert sd > 0.45 * abs(each[0] - each[1])
     with pytest.raises(KeyError):
         outcome.sizes("nothing")
+
+
+def test_a_fault_is_told_over_all_sets_with_a_cause_that_it_may_have_stood_for_and_without():
+    """A weaker magnet with half the short, or the short alone: the interval holds both."""
+    each = [SimpleNamespace(entrant=SimpleNamespace(names=n), point={"k": x}, sd={"k": 1e-4}) for n, x in SETS]
+    outcome = Outcome([Entry(n, p, 0.0, 0.0) for (n, _), p in zip(SETS, (0.4, 0.6, 0.0), strict=True)], each)
+    mean, sd = outcome.sizes_of_faults(["k"])["k"]
+    assert mean == pytest.approx(0.4 * 0.03 + 0.6 * 0.07)
+    assert sd == pytest.approx(0.04 * np.sqrt(0.4 * 0.6), rel=1e-4)
 
 
 def test_where_a_response_is_not_linear_the_interval_holds_what_other_points_say(toys):
