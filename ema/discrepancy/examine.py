@@ -9,10 +9,11 @@ import numpy as np
 
 from .findings import reject
 from .fitting import Fit, fit, jacobian
+from .form import FORM
 from .grade import Left, grade
 from .held_out import by_record, over_folds, residual_over_folds, training_errors
 from .outcome import Outcome
-from .plant import FORM, Plant
+from .plant import Plant
 from .progress import Progress
 from .rounds import (
     Reread,

@@ -10,8 +10,6 @@ from ema.core.records import Array
 
 from .engine.hypothesis import Point as Point
 
-FORM = 0.17  # what the laws of the library are off by, relative: a Lorentzian for an exponential Stribeck curve, say
-
 
 @dataclass(frozen=True)
 class Free:

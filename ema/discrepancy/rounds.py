@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from .form import FORM
 from .grade import LIMIT
-from .plant import FORM, Candidate, Plant, Point
+from .plant import Candidate, Plant, Point
 from .progress import Progress
 from .selection import (
     N_FOLDS,

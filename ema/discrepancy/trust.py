@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +9,9 @@ from scipy.stats import norm
 
 from .findings import reject
 from .fitting import WILD, Fit
+from .form import looks_like, made_by_form
 from .grade import NAMED
-from .plant import FORM, Array, Candidate, Free, Plant
+from .plant import Array, Candidate, Free, Plant
 from .progress import Progress
 from .rounds import State, drop_unneeded, is_explained, judge_model, leave_out
 from .selection import Tried, above_noise, compare
@@ -90,8 +90,8 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
 
     The mark of an effect is what the mean square of the held-out residual loses by it. Beside it stand what is left
     unexplained, what only nameless terms explain, and what the other effects' laws may miss by having the wrong form:
-    any of them may be what the effect is mistaken for. Of the last, as much as looks like it (`_looks_like`), and no
-    more than what is left allows: were the effect a stand-in for a share s of it, the share 1 - s would be left.
+    any of them may be what the effect is mistaken for. Of the last, as much as looks like it (`looks_like`), and no
+    more than what is left allows.
     """
     accepted = state.model.accepted
     terms = {k for k, c in enumerate(accepted) if c.is_structure}
@@ -107,8 +107,7 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
     for key, mark in marks.items():
         form = 0.0
         for o in [other for other in marks if other != key]:
-            s = _looks_like(made[key], made[o])
-            form += s * min(FORM**2 * marks[o], left / max(1.0 - s, 1e-9))
+            form += made_by_form(looks_like(made[key], made[o]), marks[o], left)
         trust[key] = mark / (mark + unknown + form) if mark > 0.0 else 0.0
     for c in accepted:
         if c.key in trust and _leans(state.model.fits[0], c):
@@ -140,9 +139,3 @@ def _differences(before: Tried, model: Tried) -> list[Array]:
     """What an effect does to each block, beside all that may be fitted in its place."""
     pairs = zip(before.held_out, model.held_out, strict=True)
     return [np.clip(a - b, -WILD, WILD).ravel() for a, b in pairs]
-
-
-def _looks_like(one: Sequence[Array], other: Sequence[Array]) -> float:
-    """Share in power of what one effect does that another would make, were its law of another strength by block."""
-    both = sum(float(a @ b) ** 2 / float(b @ b) for a, b in zip(one, other, strict=True) if b.any())
-    return both / max(sum(float(a @ a) for a in one), 1e-300)

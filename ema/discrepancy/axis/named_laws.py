@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.discrepancy import findings as shared
+from ema.discrepancy.form import made_by_form
 from ema.discrepancy.grade import NAMED
-from ema.discrepancy.plant import FORM
 from ema.discrepancy.rounds import IMMATERIAL
 from ema.effects import registry
 
@@ -42,7 +42,7 @@ def name_base(plant: AxisPlant, b: Balance) -> list[shared.FoundEffect]:
     clear = {name: values for name, values in of_base(b).items() if not FITTED[name] & set(plant.plant.fitted)}
     marks = {name: _mark(b, name) for name in clear}
     for name, values in clear.items():
-        form = FORM**2 * sum(mark for other, mark in marks.items() if other != name)
+        form = sum(made_by_form(1.0, mark) for other, mark in marks.items() if other != name)
         sure = round(min(marks[name] / max(marks[name] + b.left - b.noise + form, 1e-300), 1.0), 4)
         if sure < NAMED or marks[name] < IMMATERIAL * b.noise:
             continue
@@ -60,8 +60,7 @@ def name_base(plant: AxisPlant, b: Balance) -> list[shared.FoundEffect]:
 def _mark(b: Balance, name: str) -> float:
     """Mean square that inertia or drag takes of the balance beside all others, for not being the file's."""
     at = b.model.base.index(name)
-    beside, _ = np.linalg.qr(np.delete(b.model.design, at, axis=1))
-    own = b.model.design[:, at] - beside @ (beside.T @ b.model.design[:, at])
+    own = b.model.beside_others(slice(at, at + 1), b.model.design[:, at])
     return beyond_file(b)[name] ** 2 * float(np.mean(own**2))
 
 

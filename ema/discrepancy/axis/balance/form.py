@@ -1,4 +1,4 @@
-"""What looks like a law and may be the form of another one, since no law of the library has quite the right form."""
+"""What looks like a law of the balance and may be the form of its other laws."""
 
 from __future__ import annotations
 
@@ -7,48 +7,36 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.records import Array
+from ema.discrepancy.form import looks_like, made_by_form
 
 if TYPE_CHECKING:
     from .found import Balance, Term
 
-LEAST = 1e-9  # of what is left by a law that stands for all of another's form: it may leave nothing
 
-
-def made_by_form(b: Balance, term: Term, inexact: float) -> float:
-    """Mean square of what looks like `term` and may be the form of the balance's other laws. [N² m² or N²]
-
-    Laws are `inexact` by that much of what they do. Of each as much as looks like the law, and no more than what is
-    left allows: were it a stand-in for a share s of another's form, the share 1 - s would be left.
-    """
-    own, left, out = _beside_others(b, term), max(b.left - b.noise, 0.0), 0.0
-    for other in b.terms:
-        if other is not term:
-            s = _share_by_polynomials(b, term, other) if other.law.freer else _share_by_block(b, own, other)
-            allowed = np.inf if other.law.freer else left / max(1.0 - s, LEAST)
-            out += s * min(inexact**2 * other.power, allowed)
+def of_others(b: Balance, term: Term) -> float:
+    """Mean square of what looks like `term` and may be the form of the balance's other laws. [N² m² or N²]"""
+    own, left, out = _alone(b, term), max(b.left - b.noise, 0.0), 0.0
+    for other in (other for other in b.terms if other is not term):
+        if other.law.freer is not None:
+            out += made_by_form(
+                _share_by_polynomials(b, term, other.law.freer(b.model.rows.motion, b.model.acting)), other.power
+            )
+        else:
+            out += made_by_form(looks_like(own, _alone(b, other)), other.power, left)
     return out
 
 
-def _share_by_block(b: Balance, own: Array, other: Term) -> float:
-    """Share in power of what a law does that another would make, were it of another strength in each block."""
-    its, block, n = _beside_others(b, other), b.model.rows.block, b.model.rows.n_blocks
-    both, size = np.bincount(block, own * its, n), np.bincount(block, its**2, n)
-    return float(np.sum(both[size > 0.0] ** 2 / size[size > 0.0]) / max(float(own @ own), 1e-300))
+def _alone(b: Balance, term: Term) -> list[Array]:
+    """What a law does in each block beside all that may be fitted in its place. [N m or N]"""
+    part, rows = b.model.part(term.law), b.model.rows
+    own = b.model.beside_others(part, b.model.design[:, part] @ b.corrected.coefficients[part])
+    return [own[rows.block == k] for k in range(rows.n_blocks)]
 
 
-def _share_by_polynomials(b: Balance, term: Term, other: Term) -> float:
-    """The same of another that has no name, by twice its freedom."""
+def _share_by_polynomials(b: Balance, term: Term, freer: tuple[Array, ...]) -> float:
+    """Share in power of what a law does that another without a name would make with twice its freedom."""
     made, acting = b.model.rows.motion, b.model.acting
     own = np.stack(term.law.columns(made, acting), axis=1) @ b.corrected.coefficients[b.model.part(term.law)]
-    assert other.law.freer is not None
-    freer = np.stack(other.law.freer(made, acting), axis=1)
-    rest = own - freer @ np.linalg.lstsq(freer, own, rcond=None)[0]
+    A = np.stack(freer, axis=1)
+    rest = own - A @ np.linalg.lstsq(A, own, rcond=None)[0]
     return 1.0 - float(rest @ rest) / max(float(own @ own), 1e-300)
-
-
-def _beside_others(b: Balance, term: Term) -> Array:
-    """What a law does beside all that may be fitted in its place, shape (n_rows,). [N m or N]"""
-    part, A = b.model.part(term.law), b.model.design
-    Q, _ = np.linalg.qr(np.delete(A, part, axis=1))
-    own = A[:, part] @ b.corrected.coefficients[part]
-    return np.asarray(own - Q @ (Q.T @ own))

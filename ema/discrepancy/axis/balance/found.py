@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.records import Array
-from ema.discrepancy.plant import FORM
 
-from .form import made_by_form
+from .form import of_others
 from .law import BY_RECORD
 
 if TYPE_CHECKING:
@@ -98,7 +97,7 @@ class Balance:
 
         That is of the rest, and of the form of other laws. What records contradict each other in counts against it.
         """
-        rest = term.common * max(self.left - self.noise, 0.0) + made_by_form(self, term, FORM)
+        rest = term.common * max(self.left - self.noise, 0.0) + of_others(self, term)
         sure = term.wins * term.power / (term.power + rest) if term.power > 0.0 else 0.0
         return sure * self._agreed(term.law)
 

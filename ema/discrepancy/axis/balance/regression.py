@@ -98,13 +98,16 @@ class Regression:
             at += n
         raise KeyError(law.key)
 
+    def beside_others(self, part: slice, x: Array) -> Array:
+        """`x`, shape (n_rows, ...), less what all coefficients but those of a part can do of it."""
+        q, _ = np.linalg.qr(np.delete(self.design, part, axis=1))
+        return np.asarray(x - q @ (q.T @ x))
+
     def shared(self, law: Law, other: Regression) -> float:
         """Share of what the last law of `other` does, beside all that both have, that `law` can do as well."""
-        mine = self.part(law)
-        rest = np.delete(self.design, mine, axis=1)
-        q, _ = np.linalg.qr(rest)
-        own, its = self.design[:, mine], other.design[:, other.part(other.laws[-1])]
-        own, its = (x - q @ (q.T @ x) for x in (own, its))
+        mine, its = self.part(law), other.design[:, other.part(other.laws[-1])]
+        both = self.beside_others(mine, np.column_stack([self.design[:, mine], its]))
+        own, its = both[:, : law.n_columns], both[:, law.n_columns :]
         basis, _ = np.linalg.qr(own)
         return float(np.sum((basis.T @ its) ** 2) / max(float(np.sum(its**2)), 1e-300))
 
