@@ -144,8 +144,8 @@ def _find_path(search: Search) -> tuple[Search, Way, Array | None]:
         after, v = drop_constant_parts(search, path.after, path.verdict)
         if turn and path.verdict.is_noise and after is path.after:
             break
-        of_each = find_faults_beside(search, after)
-        search = begin_with_faults(search, of_each, after.fit.point)
+        of_each, point = find_faults_beside(search, after)
+        search = begin_with_faults(search, of_each, point)
         path = go_on(search, replace(path, after=after, verdict=v))
     resume(search, path)
     return search, path, of_each

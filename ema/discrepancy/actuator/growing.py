@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from ema.core.names import FAULTS
 from ema.core.records import Array
@@ -21,7 +22,18 @@ from ema.discrepancy.plant import Point
 from ema.effects import registry
 
 from .candidates import WARMER
-from .fit import N_SEEDS, Columns, Fit, fit, residuals, stacked_jacobian
+from .fit import (
+    N_SEEDS,
+    Columns,
+    Fit,
+    bounds,
+    columns,
+    fit,
+    residuals,
+    solve_within_bounds,
+    stacked_jacobian,
+    step_to,
+)
 from .free import K_FREE, Free, free
 from .model import Model
 from .noise import scatter
@@ -56,9 +68,14 @@ def find_growing_faults(search: Search, model: Model) -> Array | None:
     return faults
 
 
-def find_faults_beside(search: Search, model: Model) -> Array:
-    """Faults of each cycle beside the effects of `model`, shape (n_cycles, 6)."""
-    return _faults(search, _fit_each_cycle(search, model.fit))
+def find_faults_beside(search: Search, model: Model) -> tuple[Array, Point]:
+    """Faults of each cycle, shape (n_cycles, 6), and the point of the effects of `model` beside them.
+
+    Held-out cycles have faults of their own beside what training cycles say of the effects.
+    """
+    point = _step_together(search, model.fit, _fit_each_cycle(search, model.fit))
+    moved = replace(model.fit, point={**model.fit.point, **point})
+    return _faults(search, [_fit_one_cycle(search, moved, c) for c in range(search.plant.data.n_cycles)]), moved.point
 
 
 def _is_warming(search: Search) -> bool:
@@ -77,11 +94,42 @@ def _fit_each_cycle(search: Search, of_all: Fit) -> list[Fit]:
     return [_fit_one_cycle(search, warmer, c) for c in range(search.plant.data.n_cycles)]
 
 
+def _step_together(search: Search, of_all: Fit, fits: Sequence[Fit]) -> Point:
+    """Parameters of the effects after a Gauss–Newton step with faults of each training cycle.
+
+    Found in turn they creep: a magnet that weakens with the temperature and a short that grows with it are nearly one.
+    """
+    own = [f for f in of_all.free if f.name not in FAULTS]
+    if not own:
+        return {}
+    start = fits[0].point
+    cols = columns(search.plant, own, start, range(search.plant.n_motions))
+    parts: list[Array] = []
+    for c in search.train:
+        J = [stacked_jacobian(search.noise, own, cols, [c])]
+        J += [stacked_jacobian(search.noise, fits[c].free, fits[c].columns, [c])]
+        # All that a cycle says of its parameters is in the triangle of its QR decomposition.
+        parts.append(np.asarray(np.linalg.qr(np.column_stack([*J, fits[c].residuals[c]]), mode="r")))
+    n = len(own)
+    A = np.column_stack([np.concatenate([R[:, :n] for R in parts]), block_diag(*(R[:, n:-1] for R in parts))])
+    ends = [bounds(own, start), *(bounds(fits[c].free, fits[c].point) for c in search.train)]
+    low, high = (np.concatenate([end[side] for end in ends]) for side in (0, 1))
+    step, _ = solve_within_bounds(A, np.concatenate([R[:, -1] for R in parts]), low, high)
+    moved = step_to(start, own, step[:n])
+    return {f.name: moved[f.name] for f in own}
+
+
 def _fit_one_cycle(search: Search, of_all: Fit, cycle: int) -> Fit:
     """Faults of one cycle, with the columns of its motion."""
-    motion = int(search.plant.data.motion[cycle])
-    known = {key: column for key, column in of_all.columns.items() if key[0] == motion}
-    return _one(search, K_FREE, of_all.point, cycle, known)
+    data = search.plant.data
+    known = {key: column for key, column in of_all.columns.items() if key[0] == data.motion[cycle]}
+    return _one(search, _free_faults(search, cycle), of_all.point, cycle, known)
+
+
+def _free_faults(search: Search, cycle: int) -> list[Free]:
+    """Faults of one cycle beyond its own: with these none is less than nothing."""
+    own = search.plant.data.faults[cycle].tolist()
+    return [replace(f, low=f.low - x, high=f.high - x) for f, x in zip(K_FREE, own, strict=True)]
 
 
 def _one(search: Search, frees: Sequence[Free], start: Point, cycle: int, known: Columns | None = None) -> Fit:
@@ -94,14 +142,17 @@ def _flux_per_kelvin(search: Search, of_all: Fit, fits: Sequence[Fit]) -> float:
     One cycle does not tell a weaker magnet from shorts of all phases, so the phase with the least has none here.
     """
     shorts = _shorts()
-    k = np.array([[fitted.point[name] for name in shorts] for fitted in fits])
+    own = search.plant.data.faults[:, [FAULTS.index(name) for name in shorts]]
+    k = own + np.array([[fitted.point[name] for name in shorts] for fitted in fits])
     least = shorts[int(np.argmin(k.mean(axis=0)))]
-    frees = [*(f for f in K_FREE if f.name != least), free(CHANGE, FLUX_STEP)]
     change, sd = np.empty(len(fits)), np.empty(len(fits))
-    for c, (fitted, own) in enumerate(zip(fits, k, strict=True)):
-        others = dict(zip(shorts, (own - own.min()).tolist(), strict=True))
-        flux = of_all.point.get(CHANGE, 0.0) - float(own.min())
-        instead = _one(search, frees, {**fitted.point, **others, least: 0.0, CHANGE: flux}, c)
+    for c, fitted in enumerate(fits):
+        common = float(k[c].min())
+        without = dict(zip(shorts, (k[c] - common - own[c]).tolist(), strict=True))
+        without[least] = -float(own[c, shorts.index(least)])
+        frees = [*(f for f in _free_faults(search, c) if f.name != least), free(CHANGE, FLUX_STEP)]
+        flux = of_all.point.get(CHANGE, 0.0) - common
+        instead = _one(search, frees, {**fitted.point, **without, CHANGE: flux}, c)
         change[c], sd[c] = instead.point[CHANGE], instead.sd[CHANGE]
     dT = search.plant.data.dT
     line, covariance = np.polyfit(dT, change, 1, w=1.0 / sd, cov="unscaled")
