@@ -25,7 +25,7 @@ from .conditions import take_recorded_conditions
 from .cycles import prepare
 from .entrants import weigh_sets
 from .gear import find_resonance, start_swinging
-from .growing import describe, find_faults_beside, find_growing_faults, widen
+from .growing import describe, deviations, find_faults_beside, find_growing_faults
 from .measured import Measured
 from .model import Model
 from .next_recording import next_recording
@@ -189,9 +189,8 @@ def _write(
 ) -> tuple[Findings, Model]:
     """Findings, and the model they are of."""
     before, after, alike = path.before, answer.model, answer.alike
-    if of_each is not None and after.effects:
-        after = widen(search, after)
-    findings = write_findings(search, before, after, answer.verdict, alike, outcome)
+    least_sd = deviations(search, after) if of_each is not None and after.effects else {}
+    findings = write_findings(search, before, after, answer.verdict, alike, outcome, least_sd)
     findings = replace(findings, next_recording=next_recording(search, after, alike, findings.posterior))
     if findings.verdict == "unexplained" and not findings.effects and not findings.unnamed:
         findings, after = try_as_function(search, findings, before, after)

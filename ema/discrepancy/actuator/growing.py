@@ -166,8 +166,8 @@ def _faults(search: Search, fits: Sequence[Fit]) -> Array:
     return np.array([_beyond(own, of.point) for own, of in zip(search.plant.data.faults, fits, strict=True)])
 
 
-def widen(search: Search, model: Model) -> Model:
-    """`model` with deviations of its effects that know of faults which are free in every cycle, where they are seen.
+def deviations(search: Search, model: Model) -> dict[str, float]:
+    """Deviations of the effects of `model` that know of faults which are free in every cycle, where they are seen.
 
     Faults are never negative, so what noise makes of those that are not there does not vanish in the mean: what shorts
     of all phases have in common in a cycle is missing in the magnet.
@@ -191,7 +191,7 @@ def widen(search: Search, model: Model) -> Model:
     if PER_KELVIN in wider:
         common = k[:, [FAULTS.index(name) for name in _shorts()]].min(axis=1)
         wider[PER_KELVIN] = float(np.hypot(wider[PER_KELVIN], common.max() / np.ptp(data.dT)))
-    return replace(model, fit=replace(of_all, sd={**of_all.sd, **wider}))
+    return wider
 
 
 def _shorts() -> list[str]:

@@ -1,4 +1,4 @@
-"""How far off sizes may be: by the score, by the fit, and by a rest that nothing explains."""
+"""How far off faults may be: by the score, and by a rest that nothing explains."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.names import FAULTS
-from ema.discrepancy.engine.contest import Outcome, Weighed
+from ema.discrepancy.engine.contest import Outcome
 
 from .fit import stacked_jacobian
 from .model import Model
@@ -28,28 +28,11 @@ class Size:
     sd: float
 
 
-def deviation(name: str, score: float, model: Model, outcome: Outcome) -> float:
-    """Standard deviation of a parameter: the wider of the `score`'s and the fit's, less the doubt about dropped faults.
-
-    The score knows no simulation but its own; the fit knows how motions and honest simulations scatter, but keeps
-    faults free that the score has dropped. So the fit's counts by as much as the score's is smaller than beside all
-    that the fit has free: where a weaker magnet is alone for certain, its size does not share the doubt about three
-    shorts beside it.
-    """
-    own, fit = _weighed(model, outcome), model.fit.sd.get(name, 0.0)
-    if own is None or name not in own.sd:
-        return max(score, fit)
-    beside_all = own.sd_beside([f.name for f in model.fit.free])[name]
-    return max(score, fit * min(1.0, score / beside_all)) if beside_all > 0.0 else max(score, fit)
-
-
 def of_faults(model: Model, outcome: Outcome) -> dict[str, Size]:
     """Faults by the score, which drops those that are not there, over all sets; by the fit where none was weighed."""
-    own = _weighed(model, outcome)
-    if own is None:
-        return {name: Size(model.fit.point.get(name, 0.0), model.fit.sd.get(name, 0.0)) for name in FAULTS}
-    sizes = outcome.sizes_of_faults(FAULTS)
-    return {name: Size(value, deviation(name, sd, model, outcome)) for name, (value, sd) in sizes.items()}
+    if any(set(w.entrant.names) == set(model.names) for w in outcome.weighed):
+        return {name: Size(*of) for name, of in outcome.sizes_of_faults(FAULTS).items()}
+    return {name: Size(model.fit.point.get(name, 0.0), model.fit.sd.get(name, 0.0)) for name in FAULTS}
 
 
 def hold_rest(search: Search, model: Model, faults: Mapping[str, Size]) -> dict[str, Size]:
@@ -74,8 +57,3 @@ def _by_rest(search: Search, model: Model) -> dict[str, float]:
             off += np.sqrt(left) * np.linalg.norm(J[at], axis=0)
         length += (J**2).sum(axis=0)
     return {f.name: float(x) for f, x in zip(fit.free, off / length, strict=True)}
-
-
-def _weighed(model: Model, outcome: Outcome) -> Weighed | None:
-    """The set of a model's effects as it was weighed."""
-    return next((w for w in outcome.weighed if set(w.entrant.names) == set(model.names)), None)

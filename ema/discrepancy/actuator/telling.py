@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ from . import controller, repeating
 from .entrants import describe_posterior
 from .extension import write_extension
 from .fit import SEED, Fit
-from .intervals import FORM, deviation, hold_rest, of_faults
+from .intervals import FORM, hold_rest, of_faults
 from .leave_out import over_folds, square
 from .model import CHANCE, FINAL_SEED, N_FINAL, Model
 from .noise import SEED as NOISE_SEED
@@ -42,11 +43,18 @@ NON_INTEGER = 0.06  # distance of an order from the next integer from which it i
 
 
 def write_findings(
-    search: Search, before: Model, after: Model, v: Verdict, alike: list[tuple[str, ...]], outcome: Outcome
+    search: Search,
+    before: Model,
+    after: Model,
+    v: Verdict,
+    alike: list[tuple[str, ...]],
+    outcome: Outcome,
+    least_sd: Mapping[str, float],
 ) -> Findings:
     """The verdict on `after`, with its effects and their rivals `alike`, structure, gain over `before`, notes.
 
-    `outcome` holds the probabilities and sizes of all that was weighed.
+    `outcome` holds the probabilities and sizes of all that was weighed, `least_sd` what parameters are not known
+    better than, whatever the score says.
     """
     torque_lines = [c for c in after.effects if c.effect in ("cogging", "torque_line")]
     odd = [c for c in torque_lines if not _integer(after.fit, c.effect)]
@@ -74,7 +82,7 @@ def write_findings(
     if not search.plant.data.has_temperature:
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
     rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
-    found = [_describe_effect(search, after, c.effect, a, rest, outcome) for c, a in kept]
+    found = [_describe_effect(after, c.effect, a, rest, outcome, least_sd) for c, a in kept]
     if is_beside:
         found = [replace(e, confidence=UNCERTAIN_LAW * e.confidence) for e in found]
         notes += _recorded_once(search, after)
@@ -93,7 +101,7 @@ def write_findings(
         for m in sorted(search.tried, key=lambda m: m.heldout)
     ]
     lines = [c for c in (*odd, *further) if c in made.model.effects]
-    unnamed = [_describe_effect(search, after, c.effect, (), rest, outcome, "torque_line") for c in lines][:1]
+    unnamed = [_describe_effect(after, c.effect, (), rest, outcome, least_sd, "torque_line") for c in lines][:1]
     if further and unnamed:
         values = {name: q.value for name, q in unnamed[0].parameters.items()}
         unnamed = [replace(unnamed[0], sentence=f"a further {registry()['cogging'].said(values)}")]
@@ -199,11 +207,17 @@ def _integer(fit: Fit, line: str) -> bool:
 
 
 def _describe_effect(
-    search: Search, model: Model, effect: str, alike: tuple[str, ...], rest: float, outcome: Outcome, told_as: str = ""
+    model: Model,
+    effect: str,
+    alike: tuple[str, ...],
+    rest: float,
+    outcome: Outcome,
+    least_sd: Mapping[str, float],
+    told_as: str = "",
 ) -> FoundEffect:
     """What was fitted as `effect`, told as that or as another effect with the same parameters.
 
-    With the probability and the sizes that all sets of causes together give it, and an interval by both (`deviation`).
+    With the probability, the sizes and the intervals that all sets of causes together give it.
     `rest` is the amplitude of what is left above noise over that of what there was.
     """
     e = registry()[told_as or effect]
@@ -215,7 +229,7 @@ def _describe_effect(
         name = f"{effect}.{p.name}"
         if name in bounds:
             value, own = sizes[name]
-            parts = [deviation(name, own, model, outcome), IMPLEMENTATION * value, FORM * rest * value]
+            parts = [max(own, least_sd.get(name, 0.0)), IMPLEMENTATION * value, FORM * rest * value]
             sd = float(np.linalg.norm([*parts, e.least_sd.get(p.name, 0.0)]))
             f = bounds[name]
             values[p.name] = value

@@ -6,14 +6,14 @@ are the statistics, the same for all; so are whitening and law error.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import chi2
 
-from .evidence import Evidence, evidence, subset
+from .evidence import Evidence, evidence
 from .hypothesis import Array, Cause, Parameter, Point, Problem
 from .law_error import SHARES, LawError
 from .posterior import Entry, log_prior, posterior
@@ -85,12 +85,6 @@ class Weighed:
     def sd(self) -> dict[str, float]:
         """Their standard deviations."""
         return {p.name: float(s) for p, s in zip(self.parameters, self.evidence.sd, strict=True)}
-
-    def sd_beside(self, free: Collection[str]) -> dict[str, float]:
-        """Their standard deviations if just the faults among `free` are there."""
-        n_faults = len(self.evidence.p_fault)
-        number = int(subset(np.array([p.name in free for p in self.parameters[:n_faults]])))
-        return {p.name: float(s) for p, s in zip(self.parameters, self.evidence.sd_beside[number], strict=True)}
 
 
 @dataclass(frozen=True)
@@ -228,7 +222,6 @@ def average(found: Sequence[Weighed]) -> Weighed:
         weight @ np.array([w.evidence.p_fault for w in found]),
         mean,
         sd,
-        best.evidence.sd_beside,
     )
     between = float(weight @ (log_z - weight @ log_z) ** 2)
     return replace(best, evidence=of_all, log_evidence=total, error=float(np.hypot(best.error, np.sqrt(between))))

@@ -13,7 +13,6 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
@@ -40,20 +39,12 @@ class Evidence:
         Probability that each fault is there.
     mean, sd : arrays, shape (n_faults + n_parameters,)
         Of faults and of the causes' parameters, over all subsets.
-    sd_beside : array, shape (2 ** n_faults, n_faults + n_parameters)
-        Standard deviations given just one subset of faults, in the order of `subset`.
     """
 
     log_z: float
     p_fault: Array
     mean: Array
     sd: Array
-    sd_beside: Array
-
-
-def subset(there: Array) -> NDArray[np.intp]:
-    """Number of a subset of faults, by which of them are there, shape (..., n_faults)."""
-    return np.asarray(there @ 2.0 ** np.arange(there.shape[-1]), dtype=np.intp)
 
 
 def log_mass(low: Array, high: Array) -> Array:
@@ -142,23 +133,13 @@ def evidence(
     log_z, u, cov = np.concatenate(found), np.concatenate(means), np.concatenate(variances)
     there = np.tile(subsets, (len(shares), 1))
     var = np.diagonal(cov, axis1=1, axis2=2)
-    sd_beside = _by_subset(log_z, var, subset(there), 2 ** len(faults))
     log_z = _within(log_z, u, cov, low, high)
     total = float(logsumexp(log_z))
     weight = np.exp(log_z - total)
     u = np.clip(u, low, high)
     expected = weight @ u
     sd = np.sqrt(np.maximum(weight @ (var + u**2) - expected**2, 0.0))
-    return Evidence(total, weight @ there, expected, sd, sd_beside)
-
-
-def _by_subset(log_z: Array, var: Array, number: NDArray[np.intp], n: int) -> Array:
-    """Standard deviations of each of n subsets, (n, p), from the terms (n_terms, p) that belong to it."""
-    most = np.full(n, -np.inf)
-    np.maximum.at(most, number, log_z)
-    weight = np.exp(log_z - most[number])
-    total = np.array([np.bincount(number, weight * x, n) for x in var.T]).T
-    return np.asarray(np.sqrt(total / np.bincount(number, weight, n)[:, None]))
+    return Evidence(total, weight @ there, expected, sd)
 
 
 def _within(log_z: Array, mean: Array, cov: Array, low: Array, high: Array) -> Array:

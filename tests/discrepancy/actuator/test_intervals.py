@@ -1,4 +1,4 @@
-"""Intervals: the fit's doubt beside the same faults, and that about a rest which nothing explains."""
+"""Intervals of faults: the score's, and the doubt about a rest which nothing explains."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ema.core.names import FAULTS
 from ema.discrepancy.actuator import intervals
 
 FREE = [SimpleNamespace(name=name) for name in FAULTS]
-SCORE, BESIDE, FITTED = 1e-4, 1e-3, 5e-3
+SCORE, FITTED = 1e-4, 5e-3
 
 
 @pytest.fixture
@@ -25,27 +25,18 @@ def model():
 def outcome():
     w = SimpleNamespace(
         entrant=SimpleNamespace(names=()), sd=dict.fromkeys(FAULTS, SCORE),
-        point=dict.fromkeys(FAULTS, 0.0) | {"k1": 0.03}, sd_beside=lambda free: dict.fromkeys(free, BESIDE),
+        point=dict.fromkeys(FAULTS, 0.0) | {"k1": 0.03},
     )  # fmt: skip
     return SimpleNamespace(
         weighed=[w], sizes_of_faults=lambda faults: {name: (w.point[name], w.sd[name]) for name in faults}
     )
 
 
-def test_a_deviation_is_the_fits_less_the_doubt_about_faults_that_the_score_has_dropped(model, outcome):
-    assert intervals.deviation("k1", SCORE, model, outcome) == pytest.approx(SCORE * FITTED / BESIDE)
-    assert intervals.deviation("k1", 2.0 * BESIDE, model, outcome) == FITTED  # none dropped: the wider of both
-    model.fit.sd["k1"] = 0.1 * BESIDE  # a fit may not narrow it
-    assert intervals.deviation("k1", SCORE, model, outcome) == SCORE
-    outcome.weighed.clear()
-    assert intervals.deviation("k1", SCORE, model, outcome) == SCORE
-
-
 def test_a_fault_is_told_by_the_score_and_by_the_fit_where_its_set_was_not_weighed(model, outcome):
     """A fit keeps a short of 0.2 % that is not there; the score drops it."""
     model.fit.point = {"k1": 0.031, "k3": 0.002}
     told = intervals.of_faults(model, outcome)
-    assert told["k1"] == intervals.Size(0.03, pytest.approx(SCORE * FITTED / BESIDE))
+    assert told["k1"] == intervals.Size(0.03, SCORE)
     assert told["k3"].value == 0.0
     outcome.weighed.clear()
     assert intervals.of_faults(model, outcome)["k3"] == intervals.Size(0.002, FITTED)

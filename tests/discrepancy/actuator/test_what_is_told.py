@@ -30,7 +30,6 @@ def weighed(names, log_evidence=0.0, error=0.3, point=None, sd=None):
     entrant = SimpleNamespace(names=names, causes=())
     return SimpleNamespace(
         entrant=entrant, log_evidence=log_evidence, error=error, point=point or {}, sd=sd or {},
-        sd_beside=lambda free: sd or {},
     )  # fmt: skip
 
 
@@ -103,28 +102,28 @@ def test_a_rest_that_only_one_cycle_shows_asks_for_that_motion_again():
     assert recorded([0, 0, 1], [0, 2], [1], loud=[0, 2]) == []  # held-out cycles show it too
 
 
-def found(sd_fit, sd_score, rest, of=("viscous_drag",)):
+def found(sd_score, rest, least_sd=0.0, of=("viscous_drag",)):
     name = "viscous_drag.coefficient"
     free = (SimpleNamespace(name=name, low=0.0, high=1.0),)
-    answer = named("viscous_drag", point={name: 6e-5}, sd={name: sd_fit}, free=free)
+    answer = named("viscous_drag", point={name: 6e-5}, free=free)
     own = weighed(of, point={name: 6e-5}, sd={name: sd_score})
     parameter = SimpleNamespace(name=name)
     own.entrant.causes = (SimpleNamespace(name="viscous_drag", parameters=(parameter,)),)
     outcome = Outcome([Entry(of, 1.0, 0.0, 0.0)], [own])
-    return telling._describe_effect(None, answer, "viscous_drag", (), rest, outcome)
+    return telling._describe_effect(answer, "viscous_drag", (), rest, outcome, {name: least_sd})
 
 
-def test_an_interval_is_as_wide_as_what_is_left_and_as_the_wider_of_fit_and_score():
-    e = found(1e-6, 1e-6, rest=0.0)
+def test_an_interval_is_the_scores_and_as_wide_as_what_is_left_and_as_what_it_is_at_least():
+    e = found(1e-6, rest=0.0)
     q = e.parameters["coefficient"]
     assert (e.name, q.value) == ("viscous_drag", 6e-5)
     assert q.high - q.low == pytest.approx(2 * 1.96e-6, rel=0.05)
     assert 0.98 < e.confidence < 1.0  # what does it may not be in the library at all
-    wider = found(5e-6, 1e-6, rest=0.0).parameters["coefficient"]
-    assert wider.high - wider.low > 4.0 * (q.high - q.low)
+    wider = found(1e-6, rest=0.0, least_sd=5e-6).parameters["coefficient"]
+    assert wider.high - wider.low == pytest.approx(2 * 1.96 * 5e-6, rel=0.05)
     larger = ("viscous_drag", "inertia")  # the answer itself was not weighed
-    assert found(5e-6, 1e-6, 0.0, larger).parameters["coefficient"].high == pytest.approx(wider.high, rel=0.01)
-    left = found(1e-6, 1e-6, rest=1.0).parameters["coefficient"]
+    assert found(5e-6, 0.0, of=larger).parameters["coefficient"].high == pytest.approx(wider.high, rel=0.01)
+    left = found(1e-6, rest=1.0).parameters["coefficient"]
     assert left.high - left.low == pytest.approx(2 * 1.96 * 0.5 * 6e-5, rel=0.05)
     assert left.low >= 0.0
 

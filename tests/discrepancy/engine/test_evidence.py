@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from ema.discrepancy.engine.evidence import FAULT, WEIGHTS, WIDTHS, evidence, log_box, subset
+from ema.discrepancy.engine.evidence import FAULT, WEIGHTS, WIDTHS, evidence, log_box
 from ema.discrepancy.engine.law_error import LawError
 from ema.discrepancy.engine.posterior import log_prior, posterior
 from ema.discrepancy.engine.statistic import Prediction
@@ -118,14 +118,3 @@ def test_a_rest_smaller_than_records_have_is_no_evidence_against():
     assert less.log_rest(0.0) == pytest.approx(likeliest.log_rest(0.0))
     assert more.log_rest(0.0) < likeliest.log_rest(0.0) - 2.0
     assert more.log_rest(10.0) > more.log_rest(0.0)  # a law of another form may leave it
-
-
-def test_deviations_beside_given_faults_are_those_of_least_squares_with_just_these(toys):
-    """A size that a fault can stand for is in doubt beside it, and is not where the fault is dropped."""
-    fault, size = toys.parameter("k1", low=-100.0), toys.parameter("size", high=100.0)
-    J = 1e3 * np.array([[1.0, 1.0], [0.0, 0.1]])
-    found = evidence(known(-J @ [0.0, 2.0]), J, np.zeros(2), [fault], [[size]], LawError(2, 0.0, 0.0), (0.0,))
-    alone, beside = (found.sd_beside[int(subset(np.array([there])))] for there in (False, True))
-    assert alone == pytest.approx([0.0, 1.0 / np.linalg.norm(J[:, 1])], rel=1e-3)
-    assert beside == pytest.approx(np.sqrt(np.diag(np.linalg.inv(J.T @ J))), rel=1e-3)
-    assert found.sd[1] == pytest.approx(alone[1], rel=0.3)
