@@ -31,7 +31,7 @@ def weigh_sets(search: Search, before: Model, after: Model) -> tuple[Outcome, li
     """Probabilities of the sets of effects that were tried, and the best model of each, likeliest first."""
     search.say("probabilities of what was tried")
     problem = ActuatorProblem(search.plant)
-    models = _choose_standing(search, [before, after, *_fit_subsets(search, after)])
+    models = _choose_standing(search, [before, after, *_fit_subsets(search, after), *_fit_to_all(search, after)])
     found = [_entrant(search, m) for m in models]
     outcome = Contest(problem, found, _whitening(problem, search.noise), RECORDS, search.say).run(found)
     first = {e.names: m for m, e in reversed([*zip(models, found, strict=True)])}
@@ -73,6 +73,23 @@ def _fit_subsets(search: Search, answer: Model) -> list[Model]:
                 found[smaller.names] = smaller
                 larger.append(smaller)
     return list(found.values())
+
+
+def _fit_to_all(search: Search, answer: Model) -> list[Model]:
+    """Sets that leave no more of training cycles than the answer, fitted to all where others hold motions of their own.
+
+    One motion may not tell two causes apart which two motions do: then the held-out one speaks of what it was not
+    asked for. Of each set the model that leaves least of training cycles.
+    """
+    motion = search.plant.data.motion
+    if set(motion[search.heldout]) <= set(motion[search.train]):
+        return []
+    best: dict[frozenset[str], Model] = {}
+    for m in search.tried:
+        key = frozenset(m.names)
+        if m.fit.misfit < min(within_reach(answer), best[key].fit.misfit if key in best else np.inf):
+            best[key] = m
+    return [search.fitted_to_all(m) for m in best.values()]
 
 
 def _choose_standing(search: Search, first: list[Model]) -> list[Model]:

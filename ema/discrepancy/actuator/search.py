@@ -61,6 +61,12 @@ class Search:
             fitted = refit_with_short_steps(self.plant, self.noise, model.fit, self.train)
         return self._judged(model.effects, fitted)
 
+    def fitted_to_all(self, model: Model) -> Model:
+        """`model` fitted to training and held-out cycles alike."""
+        cycles = sorted(self.train + self.heldout)
+        fitted = fit(self.plant, self.noise, model.fit.free, model.fit.point, cycles, n_iterations=4)
+        return self._judged(model.effects, fitted)
+
     def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:
         n_seeds = N_GLANCE if fitted.given_up else N_FINAL
         left = self._misfit(self.noise, fitted.point, self.heldout, n_seeds)
