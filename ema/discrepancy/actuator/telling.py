@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 IMPLEMENTATION = 5e-4  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
 MOST_OF_IT = 0.95  # share of what faults alone leave that effects must explain to be named beside an unexplained rest
-UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: a rest is left that nothing explains
+UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: what is left is no chance
 IN_LIBRARY = 0.99  # probability that what does it is in the library at all, where it leaves nothing
 LOUD, MOST = 1.3, 0.5  # misfit of a cycle that shows a rest; share of it that is worth a word
 SEEDS = {"noise": NOISE_SEED, "fit": SEED, "held out": FINAL_SEED}  # the first of each
@@ -83,8 +83,9 @@ def write_findings(
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
     rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
     found = [_describe_effect(after, c.effect, a, rest, outcome, least_sd) for c, a in kept]
-    if is_beside:
+    if odd or not v.is_noise:
         found = [replace(e, confidence=UNCERTAIN_LAW * e.confidence) for e in found]
+    if is_beside:
         notes += _recorded_once(search, after)
     if too_little and found:
         notes.append(
