@@ -46,11 +46,6 @@ FREQUENCIES = np.geomspace(100.0, 2000.0, 32)  # [rad/s]
 DAMPINGS = (0.01, 0.03, 0.1, 0.3)
 WIDER = (1.0, 4.0)  # times the nominal backlash
 LEAST_PLAY = 1e-8  # [rad at the user] less is none
-NONE = (0.0, 0.0, 0.0, 0.0)  # C_u/J_u [1/s], F_u/J_u [rad/s²], how late θ_u is read [samples] and σ to begin with
-BESIDE = (  # where these are asked for
-    *((30.0, 1e-3, 0.0, 0.0), (30.0, 5.0, 0.0, 0.0), (0.0, 0.0, 2.0, 0.0), (0.0, 0.0, 10.0, 0.0)),
-    *((0.0, 0.0, 0.0, 0.01), (0.0, 0.0, 0.0, 0.06), (30.0, 1e-3, 0.0, 0.01)),
-)
 LOUD = 3.0  # times the noise of θ_u, from where what a gear alone leaves is asked for one of these beside it
 CLEAR = 0.7  # share of the squared gap's change from which a resonance is worth simulating
 CLEARER = 0.2  # of what play or a gear alone leaves, where one of these is asked for
@@ -78,6 +73,27 @@ class Resonance(NamedTuple):
     friction: float
     k2: float
     starts: Array
+
+
+class Beside(NamedTuple):
+    """What a fit of a gear begins with beside it, in the units of `Gear`; what is zero stays so."""
+
+    drag: float = 0.0
+    friction: float = 0.0
+    late: float = 0.0
+    spring: float = 0.0
+
+
+NONE = Beside()
+BESIDE = (  # where these are asked for
+    Beside(drag=30.0, friction=1e-3),
+    Beside(drag=30.0, friction=5.0),
+    Beside(late=2.0),
+    Beside(late=10.0),
+    Beside(spring=0.01),
+    Beside(spring=0.06),
+    Beside(drag=30.0, friction=1e-3, spring=0.01),
+)
 
 
 class Gear(NamedTuple):
@@ -178,12 +194,12 @@ def _gear(
     shafts: list[Array],
     users: list[Array],
     data: Measured,
-    beside: tuple[float, float, float, float],
+    beside: Beside,
     least: float,
 ) -> tuple[Gear, Array, float] | None:
     """A gear and the starts of its user (n_cycles, 2), which leave that much of θ_u, begun with what is `beside` it.
 
-    None where more than `least` is left, or what is left needs no resonance. What is zero to begin with stays so.
+    None where more than `least` is left, or what is left needs no resonance.
     """
     T = 1.0 / plant.control.rate
     starts = np.stack([data.start[:, 0], data.user_speed], axis=1)

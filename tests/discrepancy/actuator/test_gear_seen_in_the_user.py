@@ -1,4 +1,4 @@
-"""A gear that gives, of which the user's position is read late or held by a spring: neither is drag or stiffness.
+"""A gear that gives, seen in a user that is read late or held by a spring: neither is drag or stiffness.
 
 The records are of the tests' own simulation, which shares no code with the library.
 """
@@ -19,14 +19,20 @@ COMPLIANCE, INERTIA, DAMPER = 3e-5, 0.6, 30.0
 RATIO = DAMPER * 0.5 * np.sqrt(COMPLIANCE / INERTIA)
 
 
+def find(seed, motions, **flaws):
+    """The resonance seen in three cycles."""
+    made = hidden.cycles(
+        hidden.Flaws(user_inertia=INERTIA, user_damping=DAMPER, **flaws), 3, seed, motions, hidden.Bench()
+    )
+    plant = config.load(resources.config("actuator.yaml"), Actuator)
+    found = find_resonance(plant, prepare(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))]))
+    assert found is not None
+    return found
+
+
 @pytest.mark.parametrize("late", [0.0, 7e-4])
 def test_its_resonance_is_found_as_it_is_however_late_it_is_read(late):
-    flaws = hidden.Flaws(compliance=COMPLIANCE, user_inertia=INERTIA, user_damping=DAMPER, recorder_delay=late)
-    made = hidden.cycles(flaws, 3, 5, hidden.MOTIONS, hidden.Bench())
-    plant = config.load(resources.config("actuator.yaml"), Actuator)
-    data = prepare(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))])
-    found = find_resonance(plant, data)
-    assert found is not None
+    found = find(5, hidden.MOTIONS, compliance=COMPLIANCE, recorder_delay=late)
     assert found.compliance * found.inertia == pytest.approx(COMPLIANCE * INERTIA, rel=0.02)
     assert found.damping == pytest.approx(RATIO, rel=0.1)
     assert found.drag < 1.0  # [N m s/rad]; half of the damper's, or more, where the delay was taken for it
@@ -37,11 +43,7 @@ def test_its_resonance_is_found_as_it_is_however_late_it_is_read(late):
 def test_its_resonance_is_found_though_a_spring_holds_the_user(beside):
     """A spring twists the gear more than it rings: without one in mind no resonance was seen."""
     spring = 4000.0 if beside.get("k2") else 1500.0
-    flaws = hidden.Flaws(compliance=1.5e-5, user_inertia=INERTIA, user_damping=DAMPER, spring=spring, **beside)
-    made = hidden.cycles(flaws, 3, 2, (hidden.chirp(),), hidden.Bench())
-    plant = config.load(resources.config("actuator.yaml"), Actuator)
-    found = find_resonance(plant, prepare(plant, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))]))
-    assert found is not None
+    found = find(2, (hidden.chirp(),), compliance=1.5e-5, spring=spring, **beside)
     assert found.compliance * found.inertia == pytest.approx(1.5e-5 * INERTIA, rel=0.02)
     assert found.inertia == pytest.approx(INERTIA, rel=0.05)
     assert found.drag == pytest.approx(beside.get("user_drag", 0.0), abs=1.0)
