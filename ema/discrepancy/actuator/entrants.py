@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,11 +28,18 @@ RECORDS = 16  # simulated records of each
 WORTH_A_WORD = 0.01  # a fault
 
 
-def weigh_sets(search: Search, before: Model, after: Model) -> tuple[Outcome, list[Model]]:
-    """Probabilities of the sets of effects that were tried, and the best model of each, likeliest first."""
+def weigh_sets(
+    search: Search, before: Model, after: Model, others: Sequence[Model] = ()
+) -> tuple[Outcome, list[Model]]:
+    """Probabilities of the sets of effects that were tried, and the best model of each, likeliest first.
+
+    Weighed are faults alone, the answer, what is in it, the `others` given, and those that leave least.
+    """
     search.say("probabilities of what was tried")
     problem = ActuatorProblem(search.plant)
-    models = _choose_standing(search, [before, after, *_fit_subsets(search, after), *_fit_to_all(search, after)])
+    models = _choose_standing(
+        search, [before, after, *_fit_subsets(search, after), *_fit_to_all(search, after), *others]
+    )
     found = [_entrant(search, m) for m in models]
     outcome = Contest(problem, found, _whitening(problem, search.noise), RECORDS, search.say).run(found)
     first = {e.names: m for m, e in reversed([*zip(models, found, strict=True)])}

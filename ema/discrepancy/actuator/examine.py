@@ -24,6 +24,7 @@ from .clipping import describe as describe_ranges
 from .conditions import take_recorded_conditions
 from .cycles import prepare
 from .entrants import weigh_sets
+from .faint import fit_faint_effects, hear
 from .gear import find_resonance, start_swinging
 from .growing import describe, deviations, find_faults_beside, find_growing_faults
 from .measured import Measured
@@ -166,9 +167,21 @@ def _prefer_fewer_causes(search: Search, path: Way) -> _Answer:
 
 
 def _take_likeliest(search: Search, path: Way, found: _Answer) -> tuple[Outcome, _Answer, list[str]]:
-    """All sets weighed; the likeliest where what was found has an effect less likely than not; and notes."""
+    """All sets weighed; the likeliest where what was found has an effect less likely than not; and notes.
+
+    Where faults alone leave noise, what the score hears all the same is taken for found.
+    """
+    is_quiet = found.verdict.is_noise and not found.model.effects
+    faint = fit_faint_effects(search, found.model) if is_quiet else []
+    outcome, models = weigh_sets(search, path.before, found.model, faint)
+    if faint and (heard := hear(outcome, models)) is not None:
+        model, rivals = heard
+        search.say(f"{model.names[0]}: what is left is noise by a test of all, and the score is sure of more")
+        alike = [rivals]
+        model, v = settle_at_minimum(search, model, search.verdict(model), alike)
+        found = _Answer(model, v, alike)
+        outcome, models = weigh_sets(search, path.before, model, faint)
     sets = [(name, *rivals) for name, rivals in zip(found.model.names, found.alike, strict=True)]
-    outcome, models = weigh_sets(search, path.before, found.model)
     unlikely = [names[0] for names in sets if not is_named(outcome, found.model, *names)]
     notes = []
     if unlikely and (not models[0].effects or is_credible(models[0])):

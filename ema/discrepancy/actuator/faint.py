@@ -1,0 +1,64 @@
+"""Effects too faint for a test of all that is left: the score knows what each would do, and hears it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ema.discrepancy.engine.contest import Outcome
+from ema.discrepancy.grade import IN_SET
+
+from .fit import stacked_jacobian
+from .model import Model
+from .problem import as_cause, cost_of
+from .screening import Screened, columns_of, rank_to_first_order
+from .weighing import is_credible
+
+if TYPE_CHECKING:
+    from .search import Search
+
+N_FITTED = 6  # likeliest effects that are fitted; of one that may act in two ways, both
+SURE = 0.95  # probability that something is there, from which a record that a test calls noise is not adequate
+
+
+def fit_faint_effects(search: Search, model: Model) -> list[Model]:
+    """`model` with one effect each that promises, to first order, to be likelier than not; the likeliest few.
+
+    A test of squares asks whether anything is left along thousands of features. A clock that is fast by 0.07 % leaves
+    1.3 times what noise does there, and is three hundred nats likelier than none.
+    """
+    nats: dict[tuple[str, tuple[str, ...]], tuple[float, Screened]] = {}
+    for s in rank_to_first_order(search, model):
+        key = s.candidate.effect, s.candidate.linear
+        gain = _promise(search, model, s)
+        if gain > max(0.0, nats.get(key, (0.0, s))[0]):
+            nats[key] = gain, s
+    best: dict[str, Model] = {}
+    for _, s in sorted(nats.values(), key=lambda of: -of[0])[:N_FITTED]:
+        frees = (*model.fit.free, *s.candidate.frees)
+        m = search.model((*model.effects, s.candidate), frees, s.start, None, 4)
+        best[s.candidate.effect] = min(m, best.get(s.candidate.effect, m), key=lambda m: m.fit.misfit)
+    return list(best.values())
+
+
+def _promise(search: Search, model: Model, s: Screened) -> float:
+    """By how much likelier the record is with a candidate, to first order, less what that costs. [nats]"""
+    f = model.fit
+    own = stacked_jacobian(search.noise, f.free, f.columns, search.train)
+    J = np.concatenate([own, columns_of(search, s.candidate)], axis=1)
+    sd = np.sqrt(np.diag(np.linalg.pinv(J.T @ J)))[len(f.free) :]
+    names = (f"{s.candidate.effect}.{name}" for name in s.candidate.linear)
+    usual = {p.name: p.usual for p in as_cause(s.candidate).parameters}
+    cost = sum(float(r @ r) for r in f.residuals.values())
+    return 0.5 * (cost - s.promised) - cost_of(s.candidate, {**usual, **dict(zip(names, sd.tolist(), strict=False))})
+
+
+def hear(outcome: Outcome, models: list[Model]) -> tuple[Model, tuple[str, ...]] | None:
+    """The likeliest model of one effect and the others that it may be, where the score is sure that one is there."""
+    p = {e.causes[0]: e.probability for e in outcome.posterior if len(e.causes) == 1}
+    nothing = sum(e.probability for e in outcome.posterior if not e.causes)
+    first = next((m for m in models if len(m.names) == 1), None)
+    if first is None or nothing > 1.0 - SURE or not is_credible(first):
+        return None
+    return first, tuple(name for name, x in p.items() if name != first.names[0] and x >= IN_SET)
