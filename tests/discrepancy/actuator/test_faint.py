@@ -1,0 +1,36 @@
+"""Effects that a test of all that is left passes over: which are told, and when nothing is."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from ema.discrepancy.actuator import faint
+from ema.discrepancy.engine.contest import Outcome
+from ema.discrepancy.engine.posterior import Entry
+
+
+def weighed(**p):
+    """Posterior of sets by their names, `nothing` for faults alone, and a model of each."""
+    names = {name: () if name == "nothing" else (name,) for name in p}
+    outcome = Outcome([Entry(names[name], x, 0.0, 0.0) for name, x in p.items()], [])
+    return outcome, [SimpleNamespace(names=of) for of in names.values()]
+
+
+@pytest.fixture(autouse=True)
+def credible(monkeypatch):
+    monkeypatch.setattr(faint, "is_credible", lambda model: "incredible" not in model.names)
+
+
+def test_what_is_sure_is_told_with_all_that_it_may_be():
+    model, others = faint.hear(*weighed(clock_skew=0.7, inertia=0.26, cogging=0.03, nothing=0.01))
+    assert model.names == ("clock_skew",)
+    assert others == ("inertia",)
+
+
+def test_nothing_is_told_where_faults_alone_may_do_or_what_leads_is_no_cause():
+    assert faint.hear(*weighed(nothing=0.999, cogging=0.001)) is None
+    assert faint.hear(*weighed(clock_skew=0.9, nothing=0.1)) is None  # likelier, and not sure
+    assert faint.hear(*weighed(incredible=0.99, nothing=0.01)) is None
+    assert faint.hear(*weighed(nothing=1.0)) is None
