@@ -45,8 +45,12 @@ def trial(name: str, seed: int, n_cycles: int, *, varied: bool = True, n_threads
 def examined(
     plant: Actuator, name: str, values: dict[str, float], k: list[float], n_cycles: int, seed: int,
     motions: Any, bench: Any, n_threads: int, spoiled: Callable[[Cycle], Cycle] = lambda cycle: cycle,
+    made: tuple[str, ...] = (),
 ) -> dict[str, Any]:  # fmt: skip
-    """Hide a flaw, look for it, and lay what is found beside what was hidden; `spoiled` is what a recorder does."""
+    """Hide a flaw, look for it, and lay what is found beside what was hidden.
+
+    `spoiled` is what a recorder does, `made` names the effects that are just that.
+    """
     record = recorded(values, k, n_cycles, seed, motions, bench, spoiled)
     begun = time.process_time()
     told = {"hidden": values, "k": k}
@@ -56,7 +60,7 @@ def examined(
         return {**told, "outcome": "refused", "said": [str(error)]}
     examination = examine(plant, data, n_threads=n_threads)
     cost = costs(examination.search.plant.work, time.process_time() - begun)
-    scored = beside_truth(name, values, k, n_cycles, seed, motions, bench, examination.findings.as_dict())
+    scored = beside_truth(name, values, k, n_cycles, seed, motions, bench, examination.findings.as_dict(), made)
     return {**told, **scored, **cost}
 
 
@@ -75,14 +79,14 @@ def _flaws(values: dict[str, float], k: list[float]) -> Any:
 
 def beside_truth(
     name: str, values: dict[str, float], k: list[float], n_cycles: int, seed: int, motions: Any, bench: Any,
-    findings: dict[str, Any],
+    findings: dict[str, Any], made: tuple[str, ...] = (),
 ) -> dict[str, Any]:  # fmt: skip
-    """What is in findings.json, laid beside what was hidden."""
+    """What is in findings.json, laid beside what was hidden; and beside what the recorder `made`, which may be named."""
     found = {f"{e['name']}.{p}": q for e in findings["effects"] for p, q in e["parameters"].items()}
     true = {p: truth(values) for p, truth in cases.case(name).parameters.items() if p in found}
     sd = {p: (found[p]["high"] - found[p]["low"]) / 3.92 for p in true}
     gain = findings["gain"]
-    outcome = cases.outcome(name, findings)
+    outcome = cases.outcome(name, findings, made)
     is_missed = outcome == "missed"
     return {
         "outcome": outcome, "verdict": findings["verdict"],

@@ -135,7 +135,7 @@ def _trial(stratum: str, number: int, s: int, threads: int) -> dict[str, Any]:
     from benchmarks.discrepancy import examined
 
     t = strata.drawn(stratum, number, s)
-    bench = (t.n_cycles, bench_seed(s), t.motions, t.bench, threads, t.spoil)
+    bench = (t.n_cycles, bench_seed(s), t.motions, t.bench, threads, t.spoil, t.made)
     return {**t.told, **examined(t.actuator, t.case, t.values, t.k, *bench)}
 
 

@@ -43,7 +43,7 @@ def as_given(row: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any], tuple
     record = discrepancy.recorded(a.values, a.k, *bench, a.spoil)
     told = {**a.told, "hidden": a.values, "k": a.k}
     file = {"kind": "ema", **a.actuator.model_dump(mode="json", exclude_defaults=True, by_alias=True)}
-    return told, file, (record,), lambda said: discrepancy.beside_truth(a.case, a.values, a.k, *bench, said)
+    return told, file, (record,), lambda said: discrepancy.beside_truth(a.case, a.values, a.k, *bench, said, a.made)
 
 
 def examined_by(checkout: Path, plant_file: dict[str, Any], records: tuple[Record, ...]) -> dict[str, Any]:

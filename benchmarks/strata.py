@@ -56,6 +56,11 @@ class Trial:
         """What a recorder does to a cycle."""
         return RECORDS[self.record]
 
+    @property
+    def made(self) -> tuple[str, ...]:
+        """Effects of the library that are what the recorder does: one range for all cycles is a converter's."""
+        return ("adc_saturation",) if self.record == "clipped" else ()
+
 
 def as_actuator(n: Any) -> Actuator:
     """The plant file of a nominal plant of the second simulator."""

@@ -181,3 +181,15 @@ def test_two_commits_stand_beside_each_other_on_the_trials_that_both_have():
     assert (before.split(" (")[0], now.split(" (")[0]) == ("1 of 2", "2 of 2")
     with pytest.raises(frozen_table.MixedCommitsError):
         frozen_table.beside(new, [*old, {**old[0], "commit": "c" * 40}])
+
+
+def test_what_the_recorder_made_may_be_named_beside_what_is_hidden():
+    def told(*names, verdict="explained"):
+        return {"verdict": verdict, "effects": [{"name": n, "indistinguishable_from": []} for n in names]}
+
+    made = ("adc_saturation",)
+    assert hidden_cases.outcome("load_friction", told("load_friction", *made), made) == "right"
+    assert hidden_cases.outcome("load_friction", told("load_friction", *made)) == "wrong"
+    assert hidden_cases.outcome("load_friction", told(*made), made) == "missed"
+    assert hidden_cases.outcome("none", told(*made), made) == "right"
+    assert hidden_cases.outcome("none", told("inertia", *made), made) == "wrong"

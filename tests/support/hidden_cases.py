@@ -240,16 +240,18 @@ def visibility(hidden: Any, flaws: Any, part: str, n: int, seed: int, motions: A
     return float(np.sqrt(max(differ(flawed, sound, x) / (differ(again, sound, x) + floor**2) for x, floor in channels)))
 
 
-def outcome(name: str, findings: dict[str, Any]) -> str:
-    """How the finder did: right, in set, wrong, missed."""
+def outcome(name: str, findings: dict[str, Any], made: tuple[str, ...] = ()) -> str:
+    """How the finder did: right, in set, wrong, missed. What the recorder `made` besides may be named, or not."""
     of = case(name)
-    sets = [{e["name"], *e["indistinguishable_from"]} for e in findings["effects"]]
-    named = [e["name"] for e in findings["effects"]]
+    effects = [e for e in findings["effects"] if e["name"] in of.effects or e["name"] not in made]
+    sets = [{e["name"], *e["indistinguishable_from"]} for e in effects]
+    named = [e["name"] for e in effects]
     verdict = findings["verdict"]
     if of.outside:
         return "missed" if verdict == "adequate" else "right" if verdict == "unexplained" and not named else "wrong"
     if not of.effects:
-        return "right" if verdict == "adequate" else "wrong"
+        only_made = bool(findings["effects"]) and not named
+        return "right" if verdict == "adequate" or only_made else "wrong"
     if sorted(named) == sorted(of.effects) and all(len(s) == 1 for s in sets):
         return "right"
     if named and all(s & set(of.effects) for s in sets):
