@@ -81,7 +81,7 @@ def beside_truth(
     name: str, values: dict[str, float], k: list[float], n_cycles: int, seed: int, motions: Any, bench: Any,
     findings: dict[str, Any], made: tuple[str, ...] = (),
 ) -> dict[str, Any]:  # fmt: skip
-    """What is in findings.json, laid beside what was hidden; and beside what the recorder `made`, which may be named."""
+    """What is in findings.json, laid beside what was hidden and what the recorder `made`, which may be named too."""
     found = {f"{e['name']}.{p}": q for e in findings["effects"] for p, q in e["parameters"].items()}
     true = {p: truth(values) for p, truth in cases.case(name).parameters.items() if p in found}
     sd = {p: (found[p]["high"] - found[p]["low"]) / 3.92 for p in true}
