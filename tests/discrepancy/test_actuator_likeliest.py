@@ -55,6 +55,14 @@ def test_an_effect_that_faults_are_far_likelier_than_is_not_named(p, named):
     assert whole.is_named(outcome, answer, "magnet_flux", "inertia", "k4 and k5 alike") == named
 
 
+def test_what_stands_beside_an_effect_by_now_is_no_rival_of_it():
+    """The set with that "in its place" is the set without the effect, however likely."""
+    sets = {("recorder_gain",): 0.999, ("recorder_gain", "magnet_flux"): 0.001}
+    outcome = Outcome([Entry(causes, p, 0.0, 0.0) for causes, p in sets.items()], [])
+    answer = Model(tuple(SimpleNamespace(effect=name) for name in ("recorder_gain", "magnet_flux")), None, 1.0)
+    assert not whole.is_named(outcome, answer, "magnet_flux", "recorder_gain")
+
+
 @pytest.mark.slow
 def test_the_likeliest_set_takes_the_place_of_an_unlikely_answer(hidden, shipped_plant, monkeypatch):
     """Led to a heavier rotor where there is drag, with real noise, fits and contest on two short cycles."""

@@ -68,8 +68,10 @@ def split(data: Measured) -> tuple[list[int], list[int]]:
 def is_named(outcome: Outcome, model: Model, effect: str, *rivals: str) -> bool:
     """Whether an effect of `model` is told as a cause: one of its set is likely, and that is not faults alone.
 
-    Faults are in every model: where they do as well in its place and are far likelier, nothing is missing.
+    Faults are in every model: where they do as well in its place and are far likelier, nothing is missing. A rival that
+    was found beside it since is none: the set with that in its place is the one without the effect.
     """
+    rivals = tuple(name for name in rivals if name not in model.names)
     p = dict(zip((effect, *rivals), probabilities(outcome, model, effect, *rivals), strict=True))
     of_effects = sum(x for name, x in p.items() if name in registry())
     return sum(p.values()) >= NAMED and of_effects >= IN_SET * sum(p.values())
