@@ -25,8 +25,8 @@ SURE = 0.95  # probability that something is there, from which a record that a t
 def fit_faint_effects(search: Search, model: Model) -> list[Model]:
     """`model` with one effect each that promises, to first order, to be likelier than not; the likeliest few.
 
-    A test of squares asks whether anything is left along thousands of features. A clock that is fast by 0.07 % leaves
-    1.3 times what noise does there, and is three hundred nats likelier than none.
+    A test of squares asks whether anything is left along thousands of features. A clock that is 0.07 % off leaves 1.3
+    times what noise does there, which may be chance, and at its minimum is sixty nats likelier than none.
     """
     nats: dict[tuple[str, tuple[str, ...]], tuple[float, Screened]] = {}
     for s in rank_to_first_order(search, model):
