@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ema.core.records import Array
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.grade import IN_SET
 
@@ -28,10 +29,11 @@ def fit_faint_effects(search: Search, model: Model) -> list[Model]:
     A test of squares asks whether anything is left along thousands of features. A clock that is 0.07 % off leaves 1.3
     times what noise does there, which may be chance, and at its minimum is sixty nats likelier than none.
     """
+    own = stacked_jacobian(search.noise, model.fit.free, model.fit.columns, search.train)
     nats: dict[tuple[str, tuple[str, ...]], tuple[float, Screened]] = {}
     for s in rank_to_first_order(search, model):
         key = s.candidate.effect, s.candidate.linear
-        gain = _promise(search, model, s)
+        gain = 0.5 * (model.fit.cost - s.promised) - _cost_to_first_order(search, own, s)
         if gain > max(0.0, nats.get(key, (0.0, s))[0]):
             nats[key] = gain, s
     best: dict[str, Model] = {}
@@ -42,16 +44,13 @@ def fit_faint_effects(search: Search, model: Model) -> list[Model]:
     return list(best.values())
 
 
-def _promise(search: Search, model: Model, s: Screened) -> float:
-    """By how much likelier the record is with a candidate, to first order, less what that costs. [nats]"""
-    f = model.fit
-    own = stacked_jacobian(search.noise, f.free, f.columns, search.train)
+def _cost_to_first_order(search: Search, own: Array, s: Screened) -> float:
+    """What a candidate costs beside the columns `own` of a model, whitened, shape (n, n_free). [nats]"""
     J = np.concatenate([own, columns_of(search, s.candidate)], axis=1)
-    sd = np.sqrt(np.diag(np.linalg.pinv(J.T @ J)))[len(f.free) :]
+    sd = np.sqrt(np.diag(np.linalg.pinv(J.T @ J)))[own.shape[1] :]
     names = (f"{s.candidate.effect}.{name}" for name in s.candidate.linear)
     usual = {p.name: p.usual for p in as_cause(s.candidate).parameters}
-    cost = sum(float(r @ r) for r in f.residuals.values())
-    return 0.5 * (cost - s.promised) - cost_of(s.candidate, {**usual, **dict(zip(names, sd.tolist(), strict=False))})
+    return cost_of(s.candidate, {**usual, **dict(zip(names, sd.tolist(), strict=False))})
 
 
 def hear(outcome: Outcome, models: list[Model]) -> tuple[Model, tuple[str, ...]] | None:

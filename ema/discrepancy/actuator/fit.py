@@ -91,6 +91,11 @@ class Fit:
     sd: dict[str, float]
     given_up: bool = False
 
+    @property
+    def cost(self) -> float:
+        """Sum of squares that it leaves of the cycles it was fitted on."""
+        return sum(float(r @ r) for r in self.residuals.values())
+
 
 def residuals_at(
     plant: EmaPlant,

@@ -221,7 +221,7 @@ def _fit_for_several_faults(search: Search, model: Model, screened: Sequence[Scr
     Unless another one, simulated far from the data, takes nearly all by itself. Once one leaves noise, the others are
     asked from where that is, if they look like it.
     """
-    if model.excess > FAR and screened[0].promised < NEARLY_ALL * _cost(model):
+    if model.excess > FAR and screened[0].promised < NEARLY_ALL * model.fit.cost:
         return {}
     found: dict[str, Model] = {}
     for s in sort_by_nearness(search, model, [s for s in screened if model.shows_faults_of(s.candidate)]):
@@ -240,7 +240,7 @@ def _fit_most_promising(
 
     Before them what is plain to see in the record, whatever a simulation of it beside the wrong faults promises.
     """
-    cost = _cost(model)
+    cost = model.fit.cost
     worth = max(WORTH_A_FIT * (cost - cost / model.fit.misfit), AT_LEAST * cost)
     found: dict[str, Model] = {}
     if any(leaves_noise(search, m) for m in known.values()):
@@ -259,10 +259,6 @@ def _fit_most_promising(
             if leaves_noise(search, m):
                 break
     return found
-
-
-def _cost(model: Model) -> float:
-    return sum(float(r @ r) for r in model.fit.residuals.values())
 
 
 def _fit_candidate(search: Search, model: Model, s: Screened, to_beat: float = np.inf) -> Model:

@@ -159,12 +159,11 @@ def rank_by_simulation(search: Search, model: Model, screened: Sequence[Screened
     points = [point for of in starts for point in of]
     n_seeds, steps = (N_GLANCE_FAR, (DT_PROBE,)) if far else (N_GLANCE, None)
     here, *there = search.costs([model.fit.point, *points], cycles, typical=True, n_seeds=n_seeds, steps=steps)
-    cost = sum(float(r @ r) for r in model.fit.residuals.values())
     costs = iter(there)
     ranked = []
     for s, of in zip(screened, starts, strict=True):
         least, best = min((next(costs), at) for at in range(len(of)))
-        ranked.append(Screened(cost * least / here, s.candidate, of[best]))
+        ranked.append(Screened(model.fit.cost * least / here, s.candidate, of[best]))
     return sorted(ranked, key=_promised)
 
 
