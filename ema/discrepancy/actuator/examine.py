@@ -182,7 +182,8 @@ def _take_likeliest(search: Search, path: Way, found: _Answer) -> tuple[Outcome,
         alike = [rivals]
         model, v = settle_at_minimum(search, model, search.verdict(model), alike)
         found = _Answer(model, v, alike)
-        outcome, models = weigh_sets(search, path.before, model, faint)
+        others = [m for m in faint if m.names != model.names]
+        outcome, models = weigh_sets(search, path.before, model, others)
     sets = [(name, *rivals) for name, rivals in zip(found.model.names, found.alike, strict=True)]
     unlikely = [names[0] for names in sets if not is_named(outcome, found.model, *names)]
     notes = []
