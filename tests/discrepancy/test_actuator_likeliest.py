@@ -63,6 +63,16 @@ def test_what_stands_beside_an_effect_by_now_is_no_rival_of_it():
     assert not whole.is_named(outcome, answer, "magnet_flux", "recorder_gain")
 
 
+def test_of_effects_in_one_place_the_likeliest_is_named_first():
+    found, alike = ("asymmetric_friction", "cogging"), [("constant_load", "play"), ()]
+    assert whole.led_by(("constant_load", "cogging"), found, alike) == [("asymmetric_friction", "play"), ()]
+    assert whole.led_by(("cogging", "constant_load"), found, alike) == [(), ("asymmetric_friction", "play")]
+    assert whole.led_by(found, found, alike) == alike
+    assert whole.led_by(("cogging",), found, alike) is None
+    assert whole.led_by(("inertia", "cogging"), found, alike) is None
+    assert whole.led_by(("constant_load", "cogging", "inertia"), found, alike) is None
+
+
 @pytest.mark.slow
 def test_the_likeliest_set_takes_the_place_of_an_unlikely_answer(hidden, shipped_plant, monkeypatch):
     """Led to a heavier rotor where there is drag, with real noise, fits and contest on two short cycles."""

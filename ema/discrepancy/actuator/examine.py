@@ -49,6 +49,7 @@ from .verdicts import settle_at_minimum
 from .weighing import is_credible
 
 MIN_CYCLES = 2
+Alike = list[tuple[str, ...]]  # for each effect of a model, what does as well in its place
 N_BESIDE = 2  # turns in which faults of each cycle are found anew beside the effects
 
 
@@ -77,6 +78,19 @@ def is_named(outcome: Outcome, model: Model, effect: str, *rivals: str) -> bool:
     return sum(p.values()) >= NAMED and of_effects >= IN_SET * sum(p.values())
 
 
+def led_by(names: Sequence[str], found: Sequence[str], alike: Alike) -> Alike | None:
+    """What may be in the place of each of `names`, where these are `found` but for what may be in their place; or None.
+
+    `alike` holds, for each effect that was found, what may be in its place.
+    """
+    of: dict[str, tuple[str, ...]] = {}
+    for same in ((effect, *rivals) for effect, rivals in zip(found, alike, strict=True)):
+        own = next((name for name in same if name in names and name not in of), None)
+        if own is not None:
+            of[own] = tuple(name for name in same if name != own)
+    return [of[name] for name in names] if len(names) == len(found) and of.keys() == set(names) else None
+
+
 @dataclass(frozen=True)
 class Examination:
     """The answer with what the report draws."""
@@ -95,7 +109,7 @@ class _Answer:
 
     model: Model
     verdict: Verdict
-    alike: list[tuple[str, ...]]
+    alike: Alike
 
 
 def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progress | None = None) -> Examination:
@@ -171,7 +185,8 @@ def _prefer_fewer_causes(search: Search, path: Way) -> _Answer:
 def _take_likeliest(search: Search, path: Way, found: _Answer) -> tuple[Outcome, _Answer, list[str]]:
     """All sets weighed; the likeliest where what was found has an effect less likely than not; and notes.
 
-    Where faults alone leave noise, what the score hears all the same is taken for found.
+    Where faults alone leave noise, what the score hears all the same is taken for found. Of effects that may stand in
+    each other's place the likeliest comes first.
     """
     is_quiet = found.verdict.is_noise and not found.model.effects
     faint = fit_faint_effects(search, found.model) if is_quiet else []
@@ -196,6 +211,9 @@ def _take_likeliest(search: Search, path: Way, found: _Answer) -> tuple[Outcome,
     elif unlikely:
         notes = [f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named"]
         found = _Answer(path.before, path.verdict_before, [])
+    elif models[0].names != found.model.names and (led := led_by(models[0].names, found.model.names, found.alike)):
+        search.say(f"{' + '.join(models[0].names)} first: what may be in its place is less likely")
+        found = _Answer(models[0], search.verdict(models[0]), led)
     alike = [keep_alike(search, found.model, j, rivals) for j, rivals in enumerate(found.alike)]
     return outcome, replace(found, alike=alike), notes
 
