@@ -63,6 +63,8 @@ def add_effects(
             real = _keep_real(search, fit_with_one_more(search, after, screened, models), after, needed)
         if not real and enough:
             real = _keep_leaving_noise(search, models, after)
+        if not real and not enough and after.excess > DISTANT:
+            real = _keep_leading_on(search, models, after)
         if not real:
             break
         after, *rivals = [m for m in real if is_alike(m, real[0])]
@@ -148,6 +150,19 @@ def _keep_real(search: Search, models: Sequence[Model], after: Model, needed: fl
 def _keep_owed_to_last(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
     """Models with a credible last effect to which they owe what they gain over `after`."""
     return [m for m in models if is_credible(m) and does_it(search, m, after)]
+
+
+def _keep_leading_on(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
+    """The model that owes most to its last effect, where a further one takes enough for both.
+
+    Where faults stand for what two effects do, each of these gains little before the other is there.
+    """
+    gaining = [m for m in models[:1] if not m.is_full and m.excess < (1.0 - WORTH_A_FIT) * after.excess]
+    for m in _keep_owed_to_last(search, gaining, after):
+        two = fit_with_one_more(search, m, rank_to_first_order(search, m))
+        if two and two[0].excess < (1.0 - WORTH_IT) ** 2 * after.excess:
+            return [m]
+    return []
 
 
 def _keep_leaving_noise(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
