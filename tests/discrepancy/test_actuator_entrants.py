@@ -31,3 +31,28 @@ def test_what_was_fitted_on_the_way_to_the_cause_has_no_probability(hidden, ship
     assert models[0].names == ("magnet_flux",)
     flux, sd = outcome.sizes("magnet_flux")["magnet_flux.change"]
     assert abs(flux + 0.06) < 3.0 * sd
+
+
+@pytest.mark.slow
+def test_what_is_in_the_set_that_leads_is_weighed_too(hidden, shipped_plant):
+    """Sensors that read too low, found as a lighter rotor with recorder gains; with sensor gains it had led."""
+    gains = {"gain_a": -0.0135, "gain_b": -0.0177, "gain_c": -0.0122}
+    made = hidden.cycles(hidden.Flaws(**gains), 4, 31, motions=(hidden.chirp(duration=0.25),))
+    record = Record(tuple(Cycle(n, c) for n, c in enumerate(made)))
+    plant = EmaPlant(shipped_plant, prepare(shipped_plant, [record]), 2)
+    search = Search(plant, Noise(plant, {}), [0, 1], [2, 3])
+    before = start_model(search, {})
+    first = {c.effect: c for c in reversed(candidates(shipped_plant, plant.data, ()))}
+
+    def fit_beside_a_lighter_rotor(name):
+        of = [first["inertia"], first[name]]
+        frees = (*K_FREE, *(f for c in of for f in c.frees))
+        return search.model(of, frees, {"inertia.change": -0.016, f"{name}.gain_b": -0.003}, None, 4)
+
+    fit_beside_a_lighter_rotor("current_gain")
+    outcome, models = weigh_sets(search, before, fit_beside_a_lighter_rotor("recorder_gain"))
+    assert models[0].names == outcome.posterior[0].causes == ("current_gain",)
+    assert outcome.posterior[0].probability > 0.9
+    for name, gain in gains.items():
+        found, sd = outcome.sizes("current_gain")[f"current_gain.{name}"]
+        assert abs(found - gain) < 3.0 * sd

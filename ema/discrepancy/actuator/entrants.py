@@ -33,17 +33,23 @@ def weigh_sets(
 ) -> tuple[Outcome, list[Model]]:
     """Probabilities of the sets of effects that were tried, and the best model of each, likeliest first.
 
-    Weighed are faults alone, the answer, what is in it, the `others` given, and those that leave least.
+    Weighed are faults alone, the answer, what is in it, the `others` given, and those that leave least; and what is in
+    the set that leads then.
     """
     search.say("probabilities of what was tried")
     problem = ActuatorProblem(search.plant)
-    models = _choose_standing(
-        search, [before, after, *_fit_subsets(search, after), *_fit_to_all(search, after), *others]
-    )
-    found = [_entrant(search, m) for m in models]
-    outcome = Contest(problem, found, _whitening(problem, search.noise), RECORDS, search.say).run(found)
-    first = {e.names: m for m, e in reversed([*zip(models, found, strict=True)])}
-    return outcome, [first[entry.causes] for entry in outcome.posterior]
+    fitted = [before, after, *_fit_subsets(search, after), *_fit_to_all(search, after), *others]
+    while True:
+        models = _choose_standing(search, fitted)
+        found = [_entrant(search, m) for m in models]
+        outcome = Contest(problem, found, _whitening(problem, search.noise), RECORDS, search.say).run(found)
+        first = {e.names: m for m, e in reversed([*zip(models, found, strict=True)])}
+        leader = first[outcome.posterior[0].causes]
+        smaller = _fit_subsets(search, leader, models)
+        if not smaller:
+            return outcome, [first[entry.causes] for entry in outcome.posterior]
+        search.say(f"what is in {' + '.join(leader.names)}, which leads")
+        fitted += smaller
 
 
 def describe_posterior(outcome: Outcome) -> list[dict[str, Any]]:
@@ -64,23 +70,25 @@ def describe_posterior(outcome: Outcome) -> list[dict[str, Any]]:
     ]
 
 
-def _fit_subsets(search: Search, answer: Model) -> list[Model]:
-    """The sets of effects that are in the answer's, fitted anew from it.
+def _fit_subsets(search: Search, answer: Model, known: Sequence[Model] = ()) -> list[Model]:
+    """The sets of effects that are in the answer's and not among the `known`, fitted anew from it.
 
     What was chosen first was chosen without what came later, and what lies on a ridge with it may have been fitted
     with it: that a smaller set does as well shows only where it is fitted itself. What cannot come near the answer is
     not fitted to the end: how far it is behind is told from where that shows.
     """
-    found: dict[tuple[str, ...], Model] = {}
+    found = {frozenset(m.names): m for m in reversed(known)}
+    new: list[Model] = []
     larger = [answer]
     while larger:
         model = larger.pop(0)
         for effect in model.effects if len(model.effects) > 1 else ():
-            if tuple(c.effect for c in model.effects if c != effect) not in found:
-                smaller = search.without(model, effect, within_reach(answer))
-                found[smaller.names] = smaller
-                larger.append(smaller)
-    return list(found.values())
+            names = frozenset(c.effect for c in model.effects if c != effect)
+            if names not in found:
+                found[names] = search.without(model, effect, within_reach(answer))
+                new.append(found[names])
+            larger.append(found[names])
+    return new
 
 
 def _fit_to_all(search: Search, answer: Model) -> list[Model]:

@@ -24,7 +24,8 @@ from .clipping import describe as describe_ranges
 from .conditions import take_recorded_conditions
 from .cycles import prepare
 from .entrants import weigh_sets
-from .faint import fit_faint_effects, hear
+from .faint import fit_faint_effects, hear, may_hide_something
+from .forward import add_effects
 from .gear import find_resonance, start_swinging
 from .growing import describe, deviations, find_faults_beside, find_growing_faults
 from .measured import Measured
@@ -45,7 +46,7 @@ from .simpler import (
 )
 from .telling import probabilities, try_as_function, write_findings
 from .thinning import thin
-from .verdicts import settle_at_minimum
+from .verdicts import NEARLY, settle_at_minimum
 from .weighing import is_credible
 
 MIN_CYCLES = 2
@@ -64,6 +65,16 @@ def split(data: Measured) -> tuple[list[int], list[int]]:
     if not heldout:  # every motion once: every second motion is held out
         train, heldout = sorted(train)[::2], sorted(train)[1::2]
     return sorted(train), sorted(heldout)
+
+
+def shows_held_out_only(search: Search, before: Model) -> bool:
+    """Whether faults alone explain the training cycles and not the held-out ones, which have motions of their own.
+
+    No effect gains by a fit to motions that do not show it.
+    """
+    motion = search.plant.data.motion
+    is_apart = set(motion[search.heldout]).isdisjoint(motion[search.train])
+    return is_apart and before.fit.misfit - 1.0 < NEARLY < before.excess
 
 
 def is_named(outcome: Outcome, model: Model, effect: str, *rivals: str) -> bool:
@@ -146,6 +157,10 @@ def _find_path(search: Search) -> tuple[Search, Way, Array | None]:
     Faults of each cycle and what all cycles leave alike are found in turn.
     """
     paths = begin_with_faults_alone(search, {})
+    if shows_held_out_only(search, paths[0].before):
+        search.say("only held-out motions show that something is missing: these are fitted, and the others held out")
+        search = Search(search.plant, Noise(search.plant, {}), search.heldout, search.train, search.say)
+        paths = begin_with_faults_alone(search, {})
     of_each = None if paths[0].verdict.is_noise else find_growing_faults(search, paths[0].before)
     steady = search
     if of_each is not None:
@@ -185,20 +200,15 @@ def _prefer_fewer_causes(search: Search, path: Way) -> _Answer:
 def _take_likeliest(search: Search, path: Way, found: _Answer) -> tuple[Outcome, _Answer, list[str]]:
     """All sets weighed; the likeliest where what was found has an effect less likely than not; and notes.
 
-    Where faults alone leave noise, what the score hears all the same is taken for found. Of effects that may stand in
-    each other's place the likeliest comes first.
+    Where faults alone leave about noise, what the score hears all the same is taken for found. Of effects that may
+    stand in each other's place the likeliest comes first.
     """
-    is_quiet = found.verdict.is_noise and not found.model.effects
-    faint = fit_faint_effects(search, found.model) if is_quiet else []
+    faint = fit_faint_effects(search, found.model) if may_hide_something(found.model, found.verdict) else []
     outcome, models = weigh_sets(search, path.before, found.model, faint)
-    if faint and (heard := hear(outcome, models)) is not None:
-        model, rivals = heard
-        search.say(f"{model.names[0]}: what is left is noise by a test of all, and the score is sure of more")
-        alike = [rivals]
-        model, v = settle_at_minimum(search, model, search.verdict(model), alike)
-        found = _Answer(model, v, alike)
-        others = [m for m in faint if m.names != model.names]
-        outcome, models = weigh_sets(search, path.before, model, others)
+    if may_hide_something(found.model, found.verdict) and (heard := hear(outcome, models)) is not None:
+        found = _go_on_from_heard(search, path, *heard)
+        others = [m for m in faint if m.names != found.model.names]
+        outcome, models = weigh_sets(search, path.before, found.model, others)
     sets = [(name, *rivals) for name, rivals in zip(found.model.names, found.alike, strict=True)]
     unlikely = [names[0] for names in sets if not is_named(outcome, found.model, *names)]
     notes = []
@@ -216,6 +226,16 @@ def _take_likeliest(search: Search, path: Way, found: _Answer) -> tuple[Outcome,
         found = _Answer(models[0], search.verdict(models[0]), led)
     alike = [keep_alike(search, found.model, j, rivals) for j, rivals in enumerate(found.alike)]
     return outcome, replace(found, alike=alike), notes
+
+
+def _go_on_from_heard(search: Search, path: Way, model: Model, rivals: tuple[str, ...]) -> _Answer:
+    """What the score has heard, at its minimum, and what there is to be found beside it."""
+    search.say(f"{model.names[0]}: faults alone leave about noise, and the score is sure of more")
+    alike = [rivals]
+    model, v = settle_at_minimum(search, model, search.verdict(model), alike)
+    if not v.is_noise:
+        model, v = add_effects(search, path.before, model, v, alike)
+    return _Answer(model, v, alike)
 
 
 def _write(

@@ -1,4 +1,4 @@
-"""Effects too faint for a test of all that is left: the score knows what each would do, and hears it."""
+"""Effects too faint for a test of all that is left, or for a search: the score knows what each would do."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ema.discrepancy.grade import IN_SET
 
 from .fit import stacked_jacobian
 from .model import Model
+from .noise import Verdict
 from .problem import as_cause, cost_of
 from .screening import Screened, columns_of, rank_to_first_order
 from .weighing import is_credible
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
     from .search import Search
 
 N_FITTED = 6  # likeliest effects that are fitted; of one that may act in two ways, both
-SURE = 0.95  # probability that something is there, from which a record that a test calls noise is not adequate
+NEAR = 1.0  # excess up to which noise alone may hide from a search what a fit has found
+SURE = 0.95  # probability that something is there, from which a record that leaves about noise is not adequate
 
 
 def fit_faint_effects(search: Search, model: Model) -> list[Model]:
@@ -51,6 +53,11 @@ def _cost_to_first_order(search: Search, own: Array, s: Screened) -> float:
     names = (f"{s.candidate.effect}.{name}" for name in s.candidate.linear)
     usual = {p.name: p.usual for p in as_cause(s.candidate).parameters}
     return cost_of(s.candidate, {**usual, **dict(zip(names, sd.tolist(), strict=False))})
+
+
+def may_hide_something(model: Model, v: Verdict) -> bool:
+    """Whether nothing was found and what is left is noise or near it: the score is to say then."""
+    return not model.effects and (v.is_noise or model.excess < NEAR)
 
 
 def hear(outcome: Outcome, models: list[Model]) -> tuple[Model, tuple[str, ...]] | None:

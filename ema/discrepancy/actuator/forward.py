@@ -64,7 +64,7 @@ def add_effects(
         if not real and enough:
             real = _keep_leaving_noise(search, models, after)
         if not real and not enough and after.excess > DISTANT:
-            real = _keep_leading_on(search, models, after)
+            real = keep_leading_on(search, models, after)
         if not real:
             break
         after, *rivals = [m for m in real if is_alike(m, real[0])]
@@ -152,7 +152,7 @@ def _keep_owed_to_last(search: Search, models: Sequence[Model], after: Model) ->
     return [m for m in models if is_credible(m) and does_it(search, m, after)]
 
 
-def _keep_leading_on(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
+def keep_leading_on(search: Search, models: Sequence[Model], after: Model) -> list[Model]:
     """The model that owes most to its last effect, where a further one takes enough for both.
 
     Where faults stand for what two effects do, each of these gains little before the other is there.

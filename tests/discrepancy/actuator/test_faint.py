@@ -34,3 +34,17 @@ def test_nothing_is_told_where_faults_alone_may_do_or_what_leads_is_no_cause():
     assert faint.hear(*weighed(clock_skew=0.9, nothing=0.1)) is None  # likelier, and not sure
     assert faint.hear(*weighed(incredible=0.99, nothing=0.01)) is None
     assert faint.hear(*weighed(nothing=1.0)) is None
+
+
+@pytest.mark.parametrize(
+    ("effects", "is_noise", "left", "expected"),
+    [
+        ((), True, 0.0, True),
+        ((), False, 0.3, True),  # a test says more than noise, and no effect gained enough by a search
+        ((), False, 5.0, False),  # far more: what could say what it is has been fitted
+        (("inertia",), True, 0.0, False),
+    ],
+)
+def test_the_score_is_asked_where_nothing_was_found_in_about_noise(effects, is_noise, left, expected):
+    model, verdict = SimpleNamespace(effects=effects, excess=left), SimpleNamespace(is_noise=is_noise)
+    assert faint.may_hide_something(model, verdict) == expected
