@@ -205,7 +205,9 @@ def fit_with_one_more(
     screened = [s for s in screened if s.candidate.effect not in tried]
     if known or model.excess > FAR:
         screened = rank_by_simulation(search, model, screened)
-    refined = _fit_for_several_faults(search, model, screened)
+    refined = _fit_plainest(search, model, screened)
+    if not any(m.excess < NEARLY_ALL * model.excess for m in refined.values()):
+        refined |= _fit_for_several_faults(search, model, screened)
     refined |= _fit_most_promising(search, model, screened, refined)
     if not refined:
         return []
@@ -228,6 +230,17 @@ def _choose_leaders(model: Model, refined: Mapping[str, Model], best: Model) -> 
     standing = [m for m in refined.values() if model.shows_faults_of(m.effects[-1]) and is_alike(m, best)]
     instead = min(standing, key=lambda m: m.heldout, default=best)
     return [best] if instead is best else [best, instead]
+
+
+def _fit_plainest(search: Search, model: Model, screened: Sequence[Screened]) -> dict[str, Model]:
+    """What the record itself shows, or what leaves least when it is simulated far from the data: before all others.
+
+    It may take nearly all, and then nothing else is asked to stand for the faults.
+    """
+    s = min(screened, key=lambda s: not s.candidate.is_seen, default=None)
+    if s is None or model.shows_faults_of(s.candidate) or not (s.candidate.is_seen or model.excess > FAR):
+        return {}
+    return {s.candidate.effect: _fit_candidate(search, model, s)}
 
 
 def _fit_for_several_faults(search: Search, model: Model, screened: Sequence[Screened]) -> dict[str, Model]:
@@ -265,7 +278,7 @@ def _fit_most_promising(
         if not s.candidate.is_seen:
             if (known or found) and cost - s.promised < worth:
                 break
-            if n_guessed >= N_REFINED or (found and _stands_alone(search, found, s.promised)):
+            if n_guessed >= N_REFINED or ((known or found) and _stands_alone(search, {**known, **found}, s.promised)):
                 break
         if s.candidate.effect not in {*known, *found}:
             n_guessed += not s.candidate.is_seen
