@@ -205,10 +205,11 @@ def fit_with_one_more(
     screened = [s for s in screened if s.candidate.effect not in tried]
     if known or model.excess > FAR:
         screened = rank_by_simulation(search, model, screened)
-    refined = _fit_plainest(search, model, screened)
-    if not any(m.excess < NEARLY_ALL * model.excess for m in refined.values()):
-        refined |= _fit_for_several_faults(search, model, screened)
-    refined |= _fit_most_promising(search, model, screened, refined)
+    # Far from the data what stands for faults is no nearer to it than what promises most, and takes longer to fit.
+    in_turn = [_fit_for_several_faults, _fit_most_promising]
+    refined: dict[str, Model] = {}
+    for fit_some in reversed(in_turn) if model.excess > DISTANT else in_turn:
+        refined |= fit_some(search, model, screened, refined)
     if not refined:
         return []
     best = min(refined.values(), key=lambda m: m.heldout)
@@ -232,29 +233,20 @@ def _choose_leaders(model: Model, refined: Mapping[str, Model], best: Model) -> 
     return [best] if instead is best else [best, instead]
 
 
-def _fit_plainest(search: Search, model: Model, screened: Sequence[Screened]) -> dict[str, Model]:
-    """What the record itself shows, or what leaves least when it is simulated far from the data: before all others.
-
-    It may take nearly all, and then nothing else is asked to stand for the faults.
-    """
-    s = min(screened, key=lambda s: not s.candidate.is_seen, default=None)
-    if s is None or model.shows_faults_of(s.candidate) or not (s.candidate.is_seen or model.excess > FAR):
-        return {}
-    return {s.candidate.effect: _fit_candidate(search, model, s)}
-
-
-def _fit_for_several_faults(search: Search, model: Model, screened: Sequence[Screened]) -> dict[str, Model]:
+def _fit_for_several_faults(
+    search: Search, model: Model, screened: Sequence[Screened], known: Mapping[str, Model]
+) -> dict[str, Model]:
     """One cause for several faults, tried whatever it promises, since the faults hide that.
 
-    Unless another one, simulated far from the data, takes nearly all by itself. Once one leaves noise, the others are
-    asked from where that is, if they look like it.
+    Unless another one takes nearly all by itself. Once one leaves noise, the others are asked from where that is, if
+    they look like it.
     """
-    if model.excess > FAR and screened[0].promised < NEARLY_ALL * model.fit.cost:
+    if any(m.excess < NEARLY_ALL * model.excess for m in known.values()):
         return {}
     found: dict[str, Model] = {}
     for s in sort_by_nearness(search, model, [s for s in screened if model.shows_faults_of(s.candidate)]):
-        if s.candidate.effect not in found:
-            best = min(found.values(), key=lambda m: m.heldout, default=None)
+        if s.candidate.effect not in {*known, *found}:
+            best = min([*known.values(), *found.values()], key=lambda m: m.heldout, default=None)
             found[s.candidate.effect] = m = _fit_candidate(search, model, s, within_reach(best) if best else np.inf)
             if leaves_noise(search, m):
                 break

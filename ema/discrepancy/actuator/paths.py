@@ -9,7 +9,7 @@ from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
 from .comparators import PLAIN, take_step
-from .forward import CLOSE, add_effects, exchange_earlier_effects, try_other_first_effects
+from .forward import CLOSE, NEARLY_ALL, add_effects, exchange_earlier_effects, try_other_first_effects
 from .growing import is_steady
 from .model import CHANCE, DISTANT, Model
 from .noise import Noise, Verdict
@@ -116,7 +116,7 @@ def choose_path(search: Search, paths: list[Path]) -> Path:
     """The first path that leaves next to nothing, or else the one that leaves least by the noise of both."""
     best = _go(search, paths[0])
     for path in paths[1:]:
-        if best.verdict.is_noise or best.after.excess < CHANCE:
+        if best.verdict.is_noise or best.after.excess < max(CHANCE, min(NEARLY, NEARLY_ALL * best.before.excess)):
             break
         search.say("again, with the noise that faults alone make")
         other = _go(search, path)
