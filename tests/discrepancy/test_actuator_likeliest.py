@@ -9,6 +9,7 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator import examine as whole
+from ema.discrepancy.actuator import likeliest
 from ema.discrepancy.actuator.candidates import candidates
 from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.free import K_FREE
@@ -52,7 +53,7 @@ def led_to(name):
 def test_an_effect_that_faults_are_far_likelier_than_is_not_named(p, named):
     outcome = Outcome([Entry(causes, of, 0.0, 0.0) for causes, of in p.items()], [])
     answer = Model(tuple(SimpleNamespace(effect=name) for name in ("drag", "magnet_flux")), None, 1.0)
-    assert whole.is_named(outcome, answer, "magnet_flux", "inertia", "k4 and k5 alike") == named
+    assert likeliest.is_named(outcome, answer, "magnet_flux", "inertia", "k4 and k5 alike") == named
 
 
 def test_what_stands_beside_an_effect_by_now_is_no_rival_of_it():
@@ -60,17 +61,17 @@ def test_what_stands_beside_an_effect_by_now_is_no_rival_of_it():
     sets = {("recorder_gain",): 0.999, ("recorder_gain", "magnet_flux"): 0.001}
     outcome = Outcome([Entry(causes, p, 0.0, 0.0) for causes, p in sets.items()], [])
     answer = Model(tuple(SimpleNamespace(effect=name) for name in ("recorder_gain", "magnet_flux")), None, 1.0)
-    assert not whole.is_named(outcome, answer, "magnet_flux", "recorder_gain")
+    assert not likeliest.is_named(outcome, answer, "magnet_flux", "recorder_gain")
 
 
 def test_of_effects_in_one_place_the_likeliest_is_named_first():
     found, alike = ("asymmetric_friction", "cogging"), [("constant_load", "play"), ()]
-    assert whole.led_by(("constant_load", "cogging"), found, alike) == [("asymmetric_friction", "play"), ()]
-    assert whole.led_by(("cogging", "constant_load"), found, alike) == [(), ("asymmetric_friction", "play")]
-    assert whole.led_by(found, found, alike) == alike
-    assert whole.led_by(("cogging",), found, alike) is None
-    assert whole.led_by(("inertia", "cogging"), found, alike) is None
-    assert whole.led_by(("constant_load", "cogging", "inertia"), found, alike) is None
+    assert likeliest.led_by(("constant_load", "cogging"), found, alike) == [("asymmetric_friction", "play"), ()]
+    assert likeliest.led_by(("cogging", "constant_load"), found, alike) == [(), ("asymmetric_friction", "play")]
+    assert likeliest.led_by(found, found, alike) == alike
+    assert likeliest.led_by(("cogging",), found, alike) is None
+    assert likeliest.led_by(("inertia", "cogging"), found, alike) is None
+    assert likeliest.led_by(("constant_load", "cogging", "inertia"), found, alike) is None
 
 
 @pytest.mark.slow

@@ -12,10 +12,8 @@ from ema.core.errors import RecordError
 from ema.core.records import Array, Record
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.findings import Findings
-from ema.discrepancy.grade import IN_SET, NAMED
 from ema.discrepancy.progress import Progress
 from ema.discrepancy.report import Picture
-from ema.effects import registry
 from ema.identification.alignment import aligned
 from ema.models import actuator_file
 from ema.models.actuator import Actuator
@@ -23,11 +21,9 @@ from ema.models.actuator import Actuator
 from .clipping import describe as describe_ranges
 from .conditions import take_recorded_conditions
 from .cycles import prepare
-from .entrants import weigh_sets
-from .faint import fit_faint_effects, hear, may_hide_something
-from .forward import add_effects
 from .gear import find_resonance, start_swinging
 from .growing import describe, deviations, find_faults_beside, find_growing_faults
+from .likeliest import Answer, take_likeliest
 from .measured import Measured
 from .model import Model
 from .next_recording import next_recording
@@ -37,20 +33,12 @@ from .paths import begin_with_faults, begin_with_faults_alone, choose_path, go_o
 from .plant import EmaPlant
 from .play import add_user_friction, take_hold_of_user
 from .search import Search
-from .simpler import (
-    drop_constant_parts,
-    drop_faults,
-    keep_alike,
-    simplify,
-    take_resolver_zero,
-)
-from .telling import probabilities, try_as_function, write_findings
+from .simpler import drop_constant_parts, drop_faults, simplify, take_resolver_zero
+from .telling import try_as_function, write_findings
 from .thinning import thin
 from .verdicts import NEARLY, settle_at_minimum
-from .weighing import is_credible
 
 MIN_CYCLES = 2
-Alike = list[tuple[str, ...]]  # for each effect of a model, what does as well in its place
 N_BESIDE = 2  # turns in which faults of each cycle are found anew beside the effects
 
 
@@ -77,31 +65,6 @@ def shows_held_out_only(search: Search, before: Model) -> bool:
     return is_apart and before.fit.misfit - 1.0 < NEARLY < before.excess
 
 
-def is_named(outcome: Outcome, model: Model, effect: str, *rivals: str) -> bool:
-    """Whether an effect of `model` is told as a cause: one of its set is likely, and that is not faults alone.
-
-    Faults are in every model: where they do as well in its place and are far likelier, nothing is missing. A rival that
-    was found beside it since is none: the set with that in its place is the one without the effect.
-    """
-    rivals = tuple(name for name in rivals if name not in model.names)
-    p = dict(zip((effect, *rivals), probabilities(outcome, model, effect, *rivals), strict=True))
-    of_effects = sum(x for name, x in p.items() if name in registry())
-    return sum(p.values()) >= NAMED and of_effects >= IN_SET * sum(p.values())
-
-
-def led_by(names: Sequence[str], found: Sequence[str], alike: Alike) -> Alike | None:
-    """What may be in the place of each of `names`, where these are `found` but for what may be in their place; or None.
-
-    `alike` holds, for each effect that was found, what may be in its place.
-    """
-    of: dict[str, tuple[str, ...]] = {}
-    for same in ((effect, *rivals) for effect, rivals in zip(found, alike, strict=True)):
-        own = next((name for name in same if name in names and name not in of), None)
-        if own is not None:
-            of[own] = tuple(name for name in same if name != own)
-    return [of[name] for name in names] if len(names) == len(found) and of.keys() == set(names) else None
-
-
 @dataclass(frozen=True)
 class Examination:
     """The answer with what the report draws."""
@@ -112,15 +75,6 @@ class Examination:
     after: Model
     verdict_before: Verdict
     verdict_after: Verdict
-
-
-@dataclass(frozen=True)
-class _Answer:
-    """A model with its verdict and, for each of its effects, what does as well in its place."""
-
-    model: Model
-    verdict: Verdict
-    alike: Alike
 
 
 def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progress | None = None) -> Examination:
@@ -139,7 +93,7 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
     ema = EmaPlant(plant, data, n_threads, gear)
     say("switching noise")
     search, path, of_each = _find_path(Search(ema, Noise(ema, {}), train, heldout, say))
-    outcome, answer, notes = _take_likeliest(search, path, _prefer_fewer_causes(search, path))
+    outcome, answer, notes = take_likeliest(search, path, _prefer_fewer_causes(search, path))
     findings, after = _write(search, path, answer, outcome, of_each)
     findings.notes.extend([*conditions, *([left_out] if left_out else []), *notes])
     if findings.verdict == "adequate":
@@ -183,7 +137,7 @@ def _find_path(search: Search) -> tuple[Search, Way, Array | None]:
     return search, path, of_each
 
 
-def _prefer_fewer_causes(search: Search, path: Way) -> _Answer:
+def _prefer_fewer_causes(search: Search, path: Way) -> Answer:
     """What a path found at its minimum, with as few faults and effects as do as well."""
     before, alike = path.before, path.alike
     after, v = settled, _ = settle_at_minimum(search, path.after, path.verdict, alike)
@@ -194,52 +148,11 @@ def _prefer_fewer_causes(search: Search, path: Way) -> _Answer:
         after, v = settle_at_minimum(search, after, v, alike)
     after, v = drop_constant_parts(search, after, v)
     after, v = take_resolver_zero(search, after, v, alike)
-    return _Answer(after, v, alike)
-
-
-def _take_likeliest(search: Search, path: Way, found: _Answer) -> tuple[Outcome, _Answer, list[str]]:
-    """All sets weighed; the likeliest where what was found has an effect less likely than not; and notes.
-
-    Where faults alone leave about noise, what the score hears all the same is taken for found. Of effects that may
-    stand in each other's place the likeliest comes first.
-    """
-    faint = fit_faint_effects(search, found.model) if may_hide_something(found.model, found.verdict) else []
-    outcome, models = weigh_sets(search, path.before, found.model, faint)
-    if may_hide_something(found.model, found.verdict) and (heard := hear(outcome, models)) is not None:
-        found = _go_on_from_heard(search, path, *heard)
-        others = [m for m in faint if m.names != found.model.names]
-        outcome, models = weigh_sets(search, path.before, found.model, others)
-    sets = [(name, *rivals) for name, rivals in zip(found.model.names, found.alike, strict=True)]
-    unlikely = [names[0] for names in sets if not is_named(outcome, found.model, *names)]
-    notes = []
-    if unlikely and (not models[0].effects or is_credible(models[0])):
-        best = models[0]
-        search.say(f"{' + '.join(best.names) or 'faults only'} instead of {' + '.join(found.model.names)}")
-        of = dict(zip(found.model.names, found.alike, strict=True))
-        v = search.verdict(best) if best.effects else path.verdict_before
-        found = _Answer(best, v, [of.get(name, ()) for name in best.names])
-    elif unlikely:
-        notes = [f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named"]
-        found = _Answer(path.before, path.verdict_before, [])
-    elif models[0].names != found.model.names and (led := led_by(models[0].names, found.model.names, found.alike)):
-        search.say(f"{' + '.join(models[0].names)} first: what may be in its place is less likely")
-        found = _Answer(models[0], search.verdict(models[0]), led)
-    alike = [keep_alike(search, found.model, j, rivals) for j, rivals in enumerate(found.alike)]
-    return outcome, replace(found, alike=alike), notes
-
-
-def _go_on_from_heard(search: Search, path: Way, model: Model, rivals: tuple[str, ...]) -> _Answer:
-    """What the score has heard, at its minimum, and what there is to be found beside it."""
-    search.say(f"{model.names[0]}: faults alone leave about noise, and the score is sure of more")
-    alike = [rivals]
-    model, v = settle_at_minimum(search, model, search.verdict(model), alike)
-    if not v.is_noise:
-        model, v = add_effects(search, path.before, model, v, alike)
-    return _Answer(model, v, alike)
+    return Answer(after, v, alike)
 
 
 def _write(
-    search: Search, path: Way, answer: _Answer, outcome: Outcome, of_each: Array | None
+    search: Search, path: Way, answer: Answer, outcome: Outcome, of_each: Array | None
 ) -> tuple[Findings, Model]:
     """Findings, and the model they are of."""
     before, after, alike = path.before, answer.model, answer.alike
