@@ -23,7 +23,7 @@ from .weighing import ALIKE, DOUBTFUL, SAME, is_alike, is_credible, is_enough
 if TYPE_CHECKING:
     from .search import Search
 
-HOPELESS = 5.0  # held-out misfit after a few steps from which an effect in place of faults is given up
+HOPELESS = 5.0  # misfit promised, or held-out after a few steps, from which an effect in place of faults is given up
 ONE_CAUSE = 0.25  # relative spread up to which several parameters are one cause
 
 
@@ -200,7 +200,8 @@ def _put_in_place_of_faults(
 ) -> Model | None:
     """`model` with an effect for what several faults have in common, and without those of them that are gone."""
     rest, frees = _drop_common(model, c, common, gone)
-    made = search.model((*model.effects, c), (*frees, *c.frees), start_with(search, model, c, rest), None, 3)
+    start = start_with(search, model, c, rest)
+    made = search.model((*model.effects, c), (*frees, *c.frees), start, None, 3, HOPELESS)
     if made.heldout > HOPELESS:
         return None
     return search.model(made.effects, made.fit.free, made.fit.point, made.fit.columns, 7)
