@@ -1,9 +1,10 @@
-"""What a test of the whole record takes for noise, and the score does not."""
+"""What a test of the whole record takes for noise, or a search for the cause, and the score does not."""
 
 from __future__ import annotations
 
 import pytest
 
+from benchmarks import discrepancy, frozen, strata
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
@@ -21,3 +22,18 @@ def test_a_clock_that_is_slow_by_half_a_thousandth_is_named_and_the_shorts_besid
     assert found.confidence > 0.95
     assert found.parameters["shared"].value == pytest.approx(5e-4, rel=0.2)
     assert made.findings.gain.k_after == pytest.approx((0.0, 0.06, 0.0, 0.02, 0.0, 0.0), abs=5e-4)
+
+
+@pytest.mark.further
+@pytest.mark.slow
+def test_drag_by_the_square_of_the_speed_is_not_told_as_stribeck_friction_that_leaves_noise_too():
+    """Beside a viscous drag, on the heavy actuator: the search ends where the first of them leaves noise."""
+    seed = 3726432032
+    a = strata.drawn("two effects", 1, seed)
+    record = discrepancy.recorded(a.values, a.k, a.n_cycles, frozen.bench_seed(seed), a.motions, a.bench, a.spoil)
+    findings = examine(a.actuator, prepare(a.actuator, [record])).findings
+    assert {e.name for e in findings.effects} == {"viscous_drag", "quadratic_drag"}
+    drag = next(e for e in findings.effects if e.name == "quadratic_drag")
+    assert drag.confidence > 0.9
+    assert drag.parameters["coefficient"].value == pytest.approx(a.values["quadratic"], rel=0.1)
+    assert findings.gain.k_after == pytest.approx(a.k, abs=2e-3)

@@ -74,6 +74,14 @@ def test_of_effects_in_one_place_the_likeliest_is_named_first():
     assert likeliest.led_by(("constant_load", "cogging", "inertia"), found, alike) is None
 
 
+def test_what_is_not_unlikely_in_the_place_of_an_effect_is_told():
+    sets = {("drag", "stribeck"): 0.6, ("drag", "square"): 0.3, ("square", "stribeck"): 0.03, ("drag",): 0.07}
+    outcome = Outcome([Entry(causes, of, 0.0, 0.0) for causes, of in sets.items()], [])
+    names = ("stribeck", "drag")
+    assert likeliest.with_likely(names, [("bump", "square"), ()], outcome) == [("bump", "square"), ()]
+    assert likeliest.with_likely(names, [(), ("inertia",)], outcome) == [("square",), ("inertia",)]
+
+
 @pytest.mark.slow
 def test_the_likeliest_set_takes_the_place_of_an_unlikely_answer(hidden, shipped_plant, monkeypatch):
     """Led to a heavier rotor where there is drag, with real noise, fits and contest on two short cycles."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,12 +22,29 @@ if TYPE_CHECKING:
     from .search import Search
 
 N_FITTED = 6  # likeliest effects that are fitted; of one that may act in two ways, both
+N_RIVALS = 3  # the same in the place of what was found
 NEAR = 1.0  # excess up to which noise alone may hide from a search what a fit has found
 SURE = 0.95  # probability that something is there, from which a record that leaves about noise is not adequate
 
 
-def fit_faint_effects(search: Search, model: Model) -> list[Model]:
-    """`model` with one effect each that promises, to first order, to be likelier than not; the likeliest few.
+def fit_rivals(search: Search, answer: Model, weighed: Sequence[Model]) -> list[Model]:
+    """What may be in the place of an effect of `answer` without which about noise is left; and has not been `weighed`.
+
+    A search that has found what leaves noise asks no others but what resembles it: in the place of drag by the square
+    of the speed, beside a viscous one, stood Stribeck friction.
+    """
+    smaller = [m for m in weighed if len(m.names) == len(answer.names) - 1 and set(m.names) < set(answer.names)]
+    known = {frozenset(m.names) for m in weighed}
+    near = [m for m in {m.names: m for m in reversed(smaller)}.values() if m.excess < NEAR]
+    return [rival for m in near for rival in fit_faint_effects(search, m, N_RIVALS, known)]
+
+
+def fit_faint_effects(
+    search: Search, model: Model, n: int = N_FITTED, known: Container[frozenset[str]] = ()
+) -> list[Model]:
+    """`model` with one effect each that promises, to first order, to be likelier than not; the likeliest `n`.
+
+    Sets of effects that are `known` are passed over.
 
     A test of squares asks whether anything is left along thousands of features. A clock that is 0.07 % off leaves 1.3
     times what noise does there, which may be chance, and at its minimum is sixty nats likelier than none.
@@ -34,12 +52,14 @@ def fit_faint_effects(search: Search, model: Model) -> list[Model]:
     own = stacked_jacobian(search.noise, model.fit.free, model.fit.columns, search.train)
     nats: dict[tuple[str, tuple[str, ...]], tuple[float, Screened]] = {}
     for s in rank_to_first_order(search, model):
+        if frozenset((*model.names, s.candidate.effect)) in known:
+            continue
         key = s.candidate.effect, s.candidate.linear
         gain = 0.5 * (model.fit.cost - s.promised) - _cost_to_first_order(search, own, s)
         if gain > max(0.0, nats.get(key, (0.0, s))[0]):
             nats[key] = gain, s
     best: dict[str, Model] = {}
-    for _, s in sorted(nats.values(), key=lambda of: -of[0])[:N_FITTED]:
+    for _, s in sorted(nats.values(), key=lambda of: -of[0])[:n]:
         frees = (*model.fit.free, *s.candidate.frees)
         m = search.model((*model.effects, s.candidate), frees, s.start, None, 4)
         best[s.candidate.effect] = min(m, best.get(s.candidate.effect, m), key=lambda m: m.fit.misfit)

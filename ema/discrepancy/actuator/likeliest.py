@@ -11,7 +11,7 @@ from ema.discrepancy.grade import IN_SET, NAMED
 from ema.effects import registry
 
 from .entrants import weigh_sets
-from .faint import fit_faint_effects, hear, may_hide_something
+from .faint import fit_faint_effects, fit_rivals, hear, may_hide_something
 from .forward import add_effects
 from .model import Model
 from .noise import Verdict
@@ -52,6 +52,17 @@ def led_by(names: Sequence[str], found: Sequence[str], alike: Alike) -> Alike | 
     return [of[name] for name in names] if len(names) == len(found) and of.keys() == set(names) else None
 
 
+def with_likely(names: Sequence[str], alike: Alike, outcome: Outcome) -> Alike:
+    """`alike` of each of the effects `names` with others that are not unlikely in its place, likeliest first."""
+    p = {frozenset(e.causes): e.probability for e in outcome.posterior}
+    found = []
+    for effect, rivals in zip(names, alike, strict=True):
+        rest = frozenset(names) - {effect}
+        likely = [next(iter(of - rest)) for of, x in p.items() if x >= IN_SET and rest < of and len(of) == len(names)]
+        found.append(tuple(dict.fromkeys((*rivals, *(name for name in likely if name != effect)))))
+    return found
+
+
 @dataclass(frozen=True)
 class Answer:
     """A model with its verdict and, for each of its effects, what does as well in its place."""
@@ -73,6 +84,8 @@ def take_likeliest(search: Search, path: Path, found: Answer) -> tuple[Outcome, 
         found = _go_on_from_heard(search, path, *heard)
         others = [m for m in faint if m.names != found.model.names]
         outcome, models = weigh_sets(search, path.before, found.model, others)
+    if rivals := fit_rivals(search, found.model, models):
+        outcome, models = weigh_sets(search, path.before, found.model, [*faint, *rivals])
     sets = [(name, *rivals) for name, rivals in zip(found.model.names, found.alike, strict=True)]
     unlikely = [names[0] for names in sets if not is_named(outcome, found.model, *names)]
     notes = []
@@ -89,7 +102,7 @@ def take_likeliest(search: Search, path: Path, found: Answer) -> tuple[Outcome, 
         search.say(f"{' + '.join(models[0].names)} first: what may be in its place is less likely")
         found = Answer(models[0], search.verdict(models[0]), led)
     alike = [keep_alike(search, found.model, j, rivals) for j, rivals in enumerate(found.alike)]
-    return outcome, replace(found, alike=alike), notes
+    return outcome, replace(found, alike=with_likely(found.model.names, alike, outcome)), notes
 
 
 def _go_on_from_heard(search: Search, path: Path, model: Model, rivals: tuple[str, ...]) -> Answer:

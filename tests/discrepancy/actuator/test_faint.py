@@ -48,3 +48,19 @@ def test_nothing_is_told_where_faults_alone_may_do_or_what_leads_is_no_cause():
 def test_the_score_is_asked_where_nothing_was_found_in_about_noise(effects, is_noise, left, expected):
     model, verdict = SimpleNamespace(effects=effects, excess=left), SimpleNamespace(is_noise=is_noise)
     assert faint.may_hide_something(model, verdict) == expected
+
+
+def test_rivals_are_asked_for_where_about_noise_is_left_without_an_effect(monkeypatch):
+    """Beside the drag: without it far more than noise is left, and first order says nothing there."""
+    asked = []
+
+    def fit(search, model, n, known):
+        asked.append((model.names, known))
+        return ["a rival"]
+
+    monkeypatch.setattr(faint, "fit_faint_effects", fit)
+    left = {("drag", "stribeck"): 0.0, ("drag",): 0.3, ("stribeck",): 45.0, (): 48.0, ("drag", "inertia"): 0.2}
+    weighed = [SimpleNamespace(names=names, excess=excess) for names, excess in left.items()]
+    assert faint.fit_rivals(None, weighed[0], weighed) == ["a rival"]
+    assert asked == [(("drag",), {frozenset(names) for names in left})]
+    assert faint.fit_rivals(None, SimpleNamespace(names=()), weighed) == []
