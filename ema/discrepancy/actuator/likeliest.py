@@ -15,7 +15,7 @@ from .faint import fit_faint_effects, fit_rivals, hear, may_hide_something
 from .forward import add_effects
 from .model import Model
 from .noise import Verdict
-from .simpler import keep_alike
+from .simpler import fit_alike, keep_alike
 from .telling import probabilities
 from .verdicts import settle_at_minimum
 from .weighing import is_credible
@@ -84,7 +84,7 @@ def take_likeliest(search: Search, path: Path, found: Answer) -> tuple[Outcome, 
         found = _go_on_from_heard(search, path, *heard)
         others = [m for m in faint if m.names != found.model.names]
         outcome, models = weigh_sets(search, path.before, found.model, others)
-    if rivals := fit_rivals(search, found.model, models):
+    if rivals := _fit_unweighed(search, found, models):
         outcome, models = weigh_sets(search, path.before, found.model, [*faint, *rivals])
     sets = [(name, *rivals) for name, rivals in zip(found.model.names, found.alike, strict=True)]
     unlikely = [names[0] for names in sets if not is_named(outcome, found.model, *names)]
@@ -103,6 +103,14 @@ def take_likeliest(search: Search, path: Path, found: Answer) -> tuple[Outcome, 
         found = Answer(models[0], search.verdict(models[0]), led)
     alike = [keep_alike(search, found.model, j, rivals) for j, rivals in enumerate(found.alike)]
     return outcome, replace(found, alike=with_likely(found.model.names, alike, outcome)), notes
+
+
+def _fit_unweighed(search: Search, found: Answer, weighed: Sequence[Model]) -> list[Model]:
+    """What may be in the place of effects of an answer, by a search or by what it promises, and was not weighed."""
+    fitted = [fit_alike(search, found.model, j, rivals) for j, rivals in enumerate(found.alike)]
+    known = {frozenset(m.names) for m in weighed}
+    alike = [m for of in fitted for m in of.values() if frozenset(m.names) not in known]
+    return [*alike, *fit_rivals(search, found.model, [*weighed, *alike])]
 
 
 def _go_on_from_heard(search: Search, path: Path, model: Model, rivals: tuple[str, ...]) -> Answer:

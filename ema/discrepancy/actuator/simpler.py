@@ -141,17 +141,27 @@ def take_resolver_zero(search: Search, model: Model, v: Verdict, alike: list[tup
     return made, w
 
 
+def fit_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...]) -> dict[str, Model]:
+    """The rivals of one effect fitted in its place, beside the effects that were found after it.
+
+    Those of the last one were fitted so; and so was none where a rival was never fitted to this record.
+    """
+    if place == len(model.effects) - 1:
+        return {}
+    found = {}
+    for rival in (r for r in rivals if r not in model.names):
+        beside = [m for m in search.tried if m.names and m.names[-1] == rival]
+        if beside:
+            found[rival] = search.instead(model, model.effects[place], beside[-1])
+    return found
+
+
 def keep_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...]) -> tuple[str, ...]:
     """The rivals of one effect that do as well beside the effects that were found after it."""
     if place == len(model.effects) - 1:
         return rivals
-    kept = []
-    for rival in (r for r in rivals if r not in model.names):
-        beside = [m for m in search.tried if m.names and m.names[-1] == rival]
-        m = search.instead(model, model.effects[place], beside[-1]) if beside else model
-        if is_alike(m, model):
-            kept.append(rival)
-    return tuple(kept)
+    fitted = fit_alike(search, model, place, rivals)
+    return tuple(r for r in rivals if r not in model.names and is_alike(fitted.get(r, model), model))
 
 
 def replace_faults(search: Search, model: Model) -> list[Model]:
