@@ -12,7 +12,7 @@ from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.grade import IN_SET
 
 from .fit import stacked_jacobian
-from .model import Model
+from .model import NEAR, Model
 from .noise import Verdict
 from .problem import as_cause, cost_of
 from .screening import Screened, columns_of, rank_to_first_order
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 N_FITTED = 6  # likeliest effects that are fitted; of one that may act in two ways, both
 N_RIVALS = 3  # the same in the place of what was found
-NEAR = 1.0  # excess up to which noise alone may hide from a search what a fit has found
 SURE = 0.95  # probability that something is there, from which a record that leaves about noise is not adequate
 
 

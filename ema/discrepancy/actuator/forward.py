@@ -14,7 +14,7 @@ from ema.core.names import FAULTS
 
 from .comparators import PLAIN, take_step
 from .fit import fit
-from .model import CHANCE, DISTANT, FAR, Model, strip
+from .model import CHANCE, DISTANT, FAR, NEAR, Model, strip
 from .noise import Noise, Verdict
 from .ridge import sort_by_nearness, subtract_common, walk_ridge
 from .screening import AT_LEAST, Screened, find_look_alikes, rank_by_simulation, rank_to_first_order, start_with
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 STRONG = 0.6  # share of what is left that a further effect must take when there is enough already
 NEW_NOISE = 0.5  # share of what was left when the noise was estimated, from which it is estimated anew
 CLOSE = 0.5  # share of what was left, from which another turn is not worth it
-NEAR, N_OWN = 1.0, 3  # excess up to which flat directions count, and so many models are weighed by noise of their own
+N_OWN = 3  # models near the data that are weighed by noise of their own
 N_EXCHANGED = 2  # likeliest others that are tried in place of an earlier effect where a rest is left
 N_REFINED = 4
 WORTH_A_FIT = 0.1  # share of the squared residual beyond noise that a candidate must promise, to first order

@@ -23,6 +23,7 @@ N_GLANCE, N_GLANCE_FAR = 4, 2  # seeds that tell a good start from a bad one; wh
 K_SEEN = 0.01  # a fault that is there
 CHANCE = 0.03  # difference in misfit that seeds make
 FAR = 100.0  # excess from which candidates are simulated before they are ranked
+NEAR = 1.0  # excess up to which noise may hide what a fit has found, and what is flat counts
 DISTANT = 10.0  # excess of a model that is far from the data
 MAX_EFFECTS = 3  # that are looked for
 
