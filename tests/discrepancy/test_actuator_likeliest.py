@@ -82,6 +82,41 @@ def test_what_is_not_unlikely_in_the_place_of_an_effect_is_told():
     assert likeliest.with_likely(names, [(), ("inertia",)], outcome) == [("square",), ("inertia",)]
 
 
+def test_what_was_heard_is_never_weighed_by_its_first_fit_again(monkeypatch):
+    """Of two models of one set the last stands for both, and only the settled one is at its minimum."""
+
+    def model(*names, **more):
+        return SimpleNamespace(names=names, effects=names, excess=0.0, **more)
+
+    nothing, first, other, settled, rival = (
+        model(),
+        model("clock_skew"),
+        model("cogging"),
+        model("clock_skew"),
+        model("inertia"),
+    )
+    outcome = Outcome([Entry(("clock_skew",), 1.0, 0.0, 0.0)], [])
+    weighed = []
+
+    def weigh_sets(search, before, answer, others):
+        weighed.append((answer, list(others)))
+        return outcome, [answer]
+
+    for name, does in {
+        "fit_faint_effects": lambda search, m: [first, other],
+        "weigh_sets": weigh_sets,
+        "hear": lambda outcome, models: (first, ()),
+        "_go_on_from_heard": lambda *of: likeliest.Answer(settled, None, [()]),
+        "_fit_unweighed": lambda *of: [rival],
+        "keep_alike": lambda search, m, j, rivals: rivals,
+    }.items():
+        monkeypatch.setattr(likeliest, name, does)
+    quiet = likeliest.Answer(nothing, SimpleNamespace(is_noise=True), [])
+    _, answer, _ = likeliest.take_likeliest(None, SimpleNamespace(before=nothing), quiet)
+    assert answer.model is settled
+    assert weighed == [(nothing, [first, other]), (settled, [other]), (settled, [other, rival])]
+
+
 @pytest.mark.slow
 def test_the_likeliest_set_takes_the_place_of_an_unlikely_answer(hidden, shipped_plant, monkeypatch):
     """Led to a heavier rotor where there is drag, with real noise, fits and contest on two short cycles."""

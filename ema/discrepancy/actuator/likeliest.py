@@ -78,14 +78,15 @@ def take_likeliest(search: Search, path: Path, found: Answer) -> tuple[Outcome, 
     Where faults alone leave about noise, what the score hears all the same is taken for found. Of effects that may
     stand in each other's place the likeliest comes first.
     """
-    faint = fit_faint_effects(search, found.model) if may_hide_something(found.model, found.verdict) else []
-    outcome, models = weigh_sets(search, path.before, found.model, faint)
-    if may_hide_something(found.model, found.verdict) and (heard := hear(outcome, models)) is not None:
+    is_quiet = may_hide_something(found.model, found.verdict)
+    others = fit_faint_effects(search, found.model) if is_quiet else []
+    outcome, models = weigh_sets(search, path.before, found.model, others)
+    if is_quiet and (heard := hear(outcome, models)) is not None:
         found = _go_on_from_heard(search, path, *heard)
-        others = [m for m in faint if m.names != found.model.names]
+        others = [m for m in others if m.names != found.model.names]  # its own first fit, not at the minimum
         outcome, models = weigh_sets(search, path.before, found.model, others)
     if rivals := _fit_unweighed(search, found, models):
-        outcome, models = weigh_sets(search, path.before, found.model, [*faint, *rivals])
+        outcome, models = weigh_sets(search, path.before, found.model, [*others, *rivals])
     sets = [(name, *rivals) for name, rivals in zip(found.model.names, found.alike, strict=True)]
     unlikely = [names[0] for names in sets if not is_named(outcome, found.model, *names)]
     notes = []

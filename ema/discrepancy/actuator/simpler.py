@@ -144,7 +144,7 @@ def take_resolver_zero(search: Search, model: Model, v: Verdict, alike: list[tup
 def fit_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...]) -> dict[str, Model]:
     """The rivals of one effect fitted in its place, beside the effects that were found after it.
 
-    Those of the last one were fitted so; and so was none where a rival was never fitted to this record.
+    None for the last effect, whose rivals were fitted so already, and none of what was never fitted as a last effect.
     """
     if place == len(model.effects) - 1:
         return {}
