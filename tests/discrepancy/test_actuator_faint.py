@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from trials import examine_drawn
 
-from benchmarks import discrepancy, frozen, strata
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
@@ -28,12 +28,33 @@ def test_a_clock_that_is_slow_by_half_a_thousandth_is_named_and_the_shorts_besid
 @pytest.mark.slow
 def test_drag_by_the_square_of_the_speed_is_not_told_as_stribeck_friction_that_leaves_noise_too():
     """Beside a viscous drag, on the heavy actuator: the search ends where the first of them leaves noise."""
-    seed = 3726432032
-    a = strata.drawn("two effects", 1, seed)
-    record = discrepancy.recorded(a.values, a.k, a.n_cycles, frozen.bench_seed(seed), a.motions, a.bench, a.spoil)
-    findings = examine(a.actuator, prepare(a.actuator, [record])).findings
+    a, made = examine_drawn("two effects", 1, 3726432032)
+    findings = made.findings
     assert {e.name for e in findings.effects} == {"viscous_drag", "quadratic_drag"}
     drag = next(e for e in findings.effects if e.name == "quadratic_drag")
     assert drag.confidence > 0.9
     assert drag.parameters["coefficient"].value == pytest.approx(a.values["quadratic"], rel=0.1)
     assert findings.gain.k_after == pytest.approx(a.k, abs=2e-3)
+
+
+@pytest.mark.further
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3544058355, 78050648])
+def test_a_clock_that_controller_and_recorder_share_is_no_late_controller(seed):
+    """The recorder's own clock does other things. A late controller leaves noise too, alone or beside a magnet."""
+    a, made = examine_drawn("recorder", 4, seed)
+    (found,) = made.findings.effects
+    assert found.name == "clock_skew"
+    assert found.parameters["shared"].value == pytest.approx(a.values["clock_skew"], rel=0.15)
+    assert made.findings.gain.k_after == pytest.approx(a.k, abs=1e-3)
+
+
+@pytest.mark.further
+@pytest.mark.slow
+def test_a_heavier_rotor_with_more_friction_is_no_weaker_magnet_with_less_drag():
+    """Three shorts stand for both, beside a resolver's error on the heavy actuator; the magnet leaves 1.5 of noise."""
+    a, made = examine_drawn("two effects", 2, 1031344701)
+    assert {e.name for e in made.findings.effects} == {"resolver_error", "inertia"}
+    inertia = next(e for e in made.findings.effects if e.name == "inertia").parameters["change"]
+    assert inertia.low < a.values["inertia"] < inertia.high
+    assert made.findings.gain.k_after == pytest.approx(a.k, abs=1e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from benchmarks.foreign import record, truths
@@ -36,7 +37,7 @@ def test_a_magnet_is_found_between_none_of_the_shorts_and_all_of_them(shipped_pl
     stuck = search.model((magnet,), (*K_FREE, *magnet.frees), model.fit.point, None, 3)
     shorts = [name for name in FAULTS if name in magnet.faults]
     assert min(stuck.fit.point[name] - truth["k"][FAULTS.index(name)] for name in shorts) > 0.03
-    found = walk_ridge(search, model, stuck, magnet)
+    found = walk_ridge(search, model, stuck, magnet, np.inf)
     assert found.heldout < stuck.heldout
     assert found.fit.point["magnet_flux.change"] == pytest.approx(truth["hidden"]["magnet_flux.change"], abs=0.004)
     for name, true in zip(FAULTS, truth["k"], strict=True):

@@ -29,6 +29,8 @@ SIZES = (0.5, 1.0, 2.0, 4.0)  # times the step of a probe: usual sizes of an eff
 ZERO_KNOWN = 3e-7  # [rad at the user] to which a record tells how far the zeros of its sensors lie apart
 WARMER = 3.0  # [K] spread of winding temperature below which nothing can be said about temperature
 
+Way = tuple[str, tuple[str, ...]]  # an effect, and the parameters by which it acts
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -63,6 +65,11 @@ class Candidate:
     def is_seen(self) -> bool:
         """Whether the effect is plain to see in the record."""
         return False
+
+    @property
+    def way(self) -> Way:
+        """How the effect acts: a clock that is off may be the recorder's own or the controller's too."""
+        return self.effect, self.linear
 
     @property
     def key(self) -> str:

@@ -11,6 +11,7 @@ from ema.core.records import Array
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.grade import IN_SET
 
+from .candidates import Way
 from .fit import stacked_jacobian
 from .model import NEAR, Model
 from .noise import Verdict
@@ -33,30 +34,28 @@ def fit_rivals(search: Search, answer: Model, weighed: Sequence[Model]) -> list[
     of the speed, beside a viscous one, stood Stribeck friction.
     """
     smaller = [m for m in weighed if len(m.names) == len(answer.names) - 1 and set(m.names) < set(answer.names)]
-    known = {frozenset(m.names) for m in weighed}
+    known = {ways_of(m) for m in weighed}
     near = [m for m in {m.names: m for m in reversed(smaller)}.values() if m.excess < NEAR]
     return [rival for m in near for rival in fit_faint_effects(search, m, N_RIVALS, known)]
 
 
 def fit_faint_effects(
-    search: Search, model: Model, n: int = N_FITTED, known: Container[frozenset[str]] = ()
+    search: Search, model: Model, n: int = N_FITTED, known: Container[frozenset[Way]] = ()
 ) -> list[Model]:
     """`model` with one effect each that promises, to first order, to be likelier than not; the likeliest `n`.
 
-    Sets of effects that are `known` are passed over.
+    Sets of ways to act that are `known` are passed over.
 
     A test of squares asks whether anything is left along thousands of features. A clock that is 0.07 % off leaves 1.3
     times what noise does there, which may be chance, and at its minimum is sixty nats likelier than none.
     """
     own = stacked_jacobian(search.noise, model.fit.free, model.fit.columns, search.train)
-    nats: dict[tuple[str, tuple[str, ...]], tuple[float, Screened]] = {}
+    nats: dict[Way, tuple[float, Screened]] = {}
     for s in rank_to_first_order(search, model):
-        if frozenset((*model.names, s.candidate.effect)) in known:
-            continue
-        key = s.candidate.effect, s.candidate.linear
+        way = s.candidate.way
         gain = 0.5 * (model.fit.cost - s.promised) - _cost_to_first_order(search, own, s)
-        if gain > max(0.0, nats.get(key, (0.0, s))[0]):
-            nats[key] = gain, s
+        if ways_of(model) | {way} not in known and gain > max(0.0, nats.get(way, (0.0, s))[0]):
+            nats[way] = gain, s
     best: dict[str, Model] = {}
     for _, s in sorted(nats.values(), key=lambda of: -of[0])[:n]:
         frees = (*model.fit.free, *s.candidate.frees)
@@ -72,6 +71,11 @@ def _cost_to_first_order(search: Search, own: Array, s: Screened) -> float:
     names = (f"{s.candidate.effect}.{name}" for name in s.candidate.linear)
     usual = {p.name: p.usual for p in as_cause(s.candidate).parameters}
     return cost_of(s.candidate, {**usual, **dict(zip(names, sd.tolist(), strict=False))})
+
+
+def ways_of(model: Model) -> frozenset[Way]:
+    """The effects of a model and how they act."""
+    return frozenset(c.way for c in model.effects)
 
 
 def may_hide_something(model: Model, v: Verdict) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ema.core.names import FAULTS
 
+from .candidates import Way
 from .comparators import PLAIN, take_step
 from .fit import fit
 from .model import CHANCE, DISTANT, FAR, NEAR, Model, strip
@@ -201,13 +202,13 @@ def fit_with_one_more(
 
     With `known`, those that first order has led to, candidates that are not among them are simulated instead.
     """
-    tried = {m.names[-1] for m in known}
-    screened = [s for s in screened if s.candidate.effect not in tried]
+    tried = {m.effects[-1].way for m in known}
+    screened = [s for s in screened if s.candidate.way not in tried]
     if known or model.excess > FAR:
         screened = rank_by_simulation(search, model, screened)
     # Far from the data what stands for faults is no nearer to it than what promises most, and takes longer to fit.
     in_turn = [_fit_for_several_faults, _fit_most_promising]
-    refined: dict[str, Model] = {}
+    refined: dict[Way, Model] = {}
     for fit_some in reversed(in_turn) if model.excess > DISTANT else in_turn:
         refined |= fit_some(search, model, screened, refined)
     if not refined:
@@ -217,16 +218,17 @@ def fit_with_one_more(
     for leader in _choose_leaders(model, refined, best):
         for s in find_look_alikes(search, model, leader, screened, set(refined), only_there=near):
             m = _fit_rival(search, leader, s) if near else _fit_candidate(search, model, s, within_reach(leader))
-            effect = s.candidate.effect
-            refined[effect] = min(m, refined.get(effect, m), key=lambda x: x.heldout)
+            way = s.candidate.way
+            refined[way] = min(m, refined.get(way, m), key=lambda x: x.heldout)
     # A rival is out only if it leaves more when fitted as well as the best, or promises to.
-    for name, m in _find_near_best(refined, model):
+    for way, m in _find_near_best(refined, model):
         again = search.model(m.effects, m.fit.free, m.fit.point, None, 4, within_reach(best))
-        refined[name] = min(m, again, key=lambda x: x.heldout)
-    return sorted(refined.values(), key=lambda m: m.heldout)
+        refined[way] = min(m, again, key=lambda x: x.heldout)
+    ranked = sorted(refined.values(), key=lambda m: m.heldout)
+    return list({m.names[-1]: m for m in reversed(ranked)}.values())[::-1]  # of each effect the better way
 
 
-def _choose_leaders(model: Model, refined: Mapping[str, Model], best: Model) -> list[Model]:
+def _choose_leaders(model: Model, refined: Mapping[Way, Model], best: Model) -> list[Model]:
     """The best, and the best that stands for several faults if it does as well: from these no fit finds its rivals."""
     standing = [m for m in refined.values() if model.shows_faults_of(m.effects[-1]) and is_alike(m, best)]
     instead = min(standing, key=lambda m: m.heldout, default=best)
@@ -234,8 +236,8 @@ def _choose_leaders(model: Model, refined: Mapping[str, Model], best: Model) -> 
 
 
 def _fit_for_several_faults(
-    search: Search, model: Model, screened: Sequence[Screened], known: Mapping[str, Model]
-) -> dict[str, Model]:
+    search: Search, model: Model, screened: Sequence[Screened], known: Mapping[Way, Model]
+) -> dict[Way, Model]:
     """One cause for several faults, tried whatever it promises, since the faults hide that.
 
     Unless another one takes nearly all by itself. Once one leaves noise, the others are asked from where that is, if
@@ -243,39 +245,41 @@ def _fit_for_several_faults(
     """
     if any(m.excess < NEARLY_ALL * model.excess for m in known.values()):
         return {}
-    found: dict[str, Model] = {}
+    found: dict[Way, Model] = {}
     for s in sort_by_nearness(search, model, [s for s in screened if model.shows_faults_of(s.candidate)]):
-        if s.candidate.effect not in {*known, *found}:
+        if s.candidate.way not in {*known, *found}:
             best = min([*known.values(), *found.values()], key=lambda m: m.heldout, default=None)
-            found[s.candidate.effect] = m = _fit_candidate(search, model, s, within_reach(best) if best else np.inf)
+            found[s.candidate.way] = m = _fit_candidate(search, model, s, within_reach(best) if best else np.inf)
             if leaves_noise(search, m):
                 break
     return found
 
 
 def _fit_most_promising(
-    search: Search, model: Model, screened: Sequence[Screened], known: Mapping[str, Model]
-) -> dict[str, Model]:
+    search: Search, model: Model, screened: Sequence[Screened], known: Mapping[Way, Model]
+) -> dict[Way, Model]:
     """Those that promise most, one at least if none is known, until one leaves noise.
 
     Before them what is plain to see in the record, whatever a simulation of it beside the wrong faults promises.
     """
     cost = model.fit.cost
     worth = max(WORTH_A_FIT * (cost - cost / model.fit.misfit), AT_LEAST * cost)
-    found: dict[str, Model] = {}
+    found: dict[Way, Model] = {}
     if any(leaves_noise(search, m) for m in known.values()):
         return found
-    n_guessed = 0
+    guessed: set[str] = set()
     for s in sorted(screened, key=lambda s: not s.candidate.is_seen):
         if not s.candidate.is_seen:
             if (known or found) and cost - s.promised < worth:
                 break
-            if n_guessed >= N_REFINED or ((known or found) and _stands_alone(search, {**known, **found}, s.promised)):
+            if len(guessed) >= N_REFINED or (
+                (known or found) and _stands_alone(search, {**known, **found}, s.promised)
+            ):
                 break
-        if s.candidate.effect not in {*known, *found}:
-            n_guessed += not s.candidate.is_seen
+        if s.candidate.way not in {*known, *found}:
+            guessed |= set() if s.candidate.is_seen else {s.candidate.effect}
             best = min(found.values(), key=lambda m: m.heldout, default=None)
-            found[s.candidate.effect] = m = _fit_candidate(search, model, s, within_reach(best) if best else np.inf)
+            found[s.candidate.way] = m = _fit_candidate(search, model, s, within_reach(best) if best else np.inf)
             if leaves_noise(search, m):
                 break
     return found
@@ -295,8 +299,7 @@ def _fit_candidate(search: Search, model: Model, s: Screened, to_beat: float = n
         if simpler_cost < NO_WORSE * cost:
             start = simpler
     made = search.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3, to_beat)
-    may_be_walked = model.shows_faults_of(s.candidate) and not made.fit.given_up
-    return walk_ridge(search, model, made, s.candidate) if may_be_walked else made
+    return walk_ridge(search, model, made, s.candidate, to_beat) if model.shows_faults_of(s.candidate) else made
 
 
 def _fit_rival(search: Search, best: Model, s: Screened) -> Model:
@@ -306,7 +309,7 @@ def _fit_rival(search: Search, best: Model, s: Screened) -> Model:
     return search.model((*effects, s.candidate), free, s.start, best.fit.columns, 3, within_reach(best))
 
 
-def _find_near_best(refined: dict[str, Model], model: Model) -> list[tuple[str, Model]]:
+def _find_near_best(refined: dict[Way, Model], model: Model) -> list[tuple[Way, Model]]:
     """The models near the best, by what there was to explain too; none if the best stands alone without a rest."""
     ranked = sorted(refined.items(), key=lambda item: item[1].heldout)
     best = ranked[0][1]
@@ -315,7 +318,7 @@ def _find_near_best(refined: dict[str, Model], model: Model) -> list[tuple[str, 
     return near if len(near) > 1 or best.excess > NEAR_NOISE else []
 
 
-def _stands_alone(search: Search, refined: dict[str, Model], promised: float) -> bool:
+def _stands_alone(search: Search, refined: Mapping[Way, Model], promised: float) -> bool:
     """Whether one leaves nearly nothing, and what is left to try promises far less."""
     n = sum(len(search.plant.data.y[c]) for c in search.train)
     reached = min(m.fit.misfit for m in refined.values())

@@ -11,11 +11,11 @@ from ema.discrepancy.grade import IN_SET, NAMED
 from ema.effects import registry
 
 from .entrants import weigh_sets
-from .faint import fit_faint_effects, fit_rivals, hear, may_hide_something
+from .faint import fit_faint_effects, fit_rivals, hear, may_hide_something, ways_of
 from .forward import add_effects
-from .model import Model
+from .model import NEAR, Model
 from .noise import Verdict
-from .simpler import fit_alike, keep_alike
+from .simpler import fit_alike, fit_one_for_several, keep_alike
 from .telling import probabilities
 from .verdicts import settle_at_minimum
 from .weighing import is_credible
@@ -109,8 +109,9 @@ def take_likeliest(search: Search, path: Path, found: Answer) -> tuple[Outcome, 
 def _fit_unweighed(search: Search, found: Answer, weighed: Sequence[Model]) -> list[Model]:
     """What may be in the place of effects of an answer, by a search or by what it promises, and was not weighed."""
     fitted = [fit_alike(search, found.model, j, rivals) for j, rivals in enumerate(found.alike)]
-    known = {frozenset(m.names) for m in weighed}
-    alike = [m for of in fitted for m in of.values() if frozenset(m.names) not in known]
+    fewer = fit_one_for_several(search, found.model) if found.model.excess < NEAR else []
+    known = {ways_of(m) for m in weighed}
+    alike = [m for of in (*(x.values() for x in fitted), fewer) for m in of if ways_of(m) not in known]
     return [*alike, *fit_rivals(search, found.model, [*weighed, *alike])]
 
 

@@ -61,11 +61,11 @@ class Model:
         return len(faults) > 1 and all(self.fit.point.get(name, 0.0) > K_SEEN for name in faults)
 
 
-def strip(model: Model, effect: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:
-    """Effects, free parameters and point of a model without one of its effects."""
-    own = {f.name for f in effect.frees}
-    point = {name: x for name, x in model.fit.point.items() if not name.startswith(f"{effect.effect}.")}
-    effects = tuple(c for c in model.effects if c != effect)
+def strip(model: Model, *gone: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:
+    """Effects, free parameters and point of a model without some of its effects."""
+    own, names = {f.name for c in gone for f in c.frees}, {c.effect for c in gone}
+    point = {name: x for name, x in model.fit.point.items() if name.split(".")[0] not in names}
+    effects = tuple(c for c in model.effects if c not in gone)
     return effects, tuple(f for f in model.fit.free if f.name not in own), point
 
 

@@ -16,6 +16,7 @@ from ema.discrepancy.plant import Point
 
 from .candidates import Candidate
 from .fit import fit
+from .free import K_FREE
 from .model import FAR, Model
 from .screening import COLLINEAR, Screened, start_with
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 N_SHARES = 8  # of the ridge
 
 
-def walk_ridge(search: Search, model: Model, made: Model, effect: Candidate) -> Model:
+def walk_ridge(search: Search, model: Model, made: Model, effect: Candidate, to_beat: float) -> Model:
     """`made`, which is `model` with an effect that several of its faults can stand for, or one that leaves less.
 
     The other one is fitted from the lowest point of the ridge, if that is lower than where `made` ended.
@@ -35,31 +36,35 @@ def walk_ridge(search: Search, model: Model, made: Model, effect: Candidate) -> 
     lowest = int(np.argmin(costs))
     if lowest == 0:
         return made
-    other = search.model(made.effects, made.fit.free, points[lowest - 1], None, 3)
+    other = search.model(made.effects, made.fit.free, points[lowest - 1], None, 3, to_beat)
     return min(made, other, key=lambda m: m.heldout)
 
 
 def _ridge(search: Search, model: Model, effect: Candidate) -> list[Point]:
     """Points at equal distances, from an eighth of the faults' common part by the effect to all of it.
 
-    The effect is fitted at the middle and at the end; between them it goes along a parabola.
+    The effect is fitted at the middle and at the end, with the other faults: shorts of all phases do what inertia does
+    with friction. Between them these go along a parabola.
     """
-    k, neutral = model.fit.point, {f.name: search.plant.neutral(f.name) for f in effect.frees}
+    k = model.fit.point
     common = min(k[name] for name in effect.faults)
+    frees = (*(f for f in K_FREE if f.name not in effect.faults), *effect.frees)
+    begin = {f.name: k.get(f.name, search.plant.neutral(f.name)) for f in frees}
 
     def faults(share: float) -> Point:
         return {name: k[name] - share * common for name in effect.faults}
 
     middle, end = (
-        fit(search.plant, search.noise, effect.frees, start_with(search, model, effect, faults(s)), search.train).point
+        fit(search.plant, search.noise, frees, start_with(search, model, effect, faults(s)), search.train).point
         for s in (0.5, 1.0)
     )
 
     def at(s: float) -> Point:
         size = {
             name: x + s * (4.0 * middle[name] - 3.0 * x - end[name]) + 2.0 * s**2 * (x + end[name] - 2.0 * middle[name])
-            for name, x in neutral.items()
+            for name, x in begin.items()
         }
+        size = {f.name: float(np.clip(size[f.name], f.low, f.high)) for f in frees}
         return {**end, **faults(s), **size}
 
     return [at((1.0 + j) / N_SHARES) for j in range(N_SHARES)]

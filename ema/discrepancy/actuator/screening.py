@@ -12,7 +12,7 @@ from ema.core.names import FAULTS
 from ema.core.records import Array
 from ema.discrepancy.plant import Point
 
-from .candidates import Candidate, candidates
+from .candidates import Candidate, Way, candidates
 from .fit import SEED, bounds, residuals, residuals_at, solve_within_bounds, stacked_jacobian, step_to
 from .free import Free
 from .model import DISTANT, FAR, N_GLANCE, N_GLANCE_FAR, Model, strip
@@ -28,6 +28,7 @@ DT_PROBE = 2e-6  # [s] step of a simulation that only screens: its columns are w
 AT_LEAST = 0.01  # share of the whole squared residual that it must promise
 COLLINEAR = 0.8  # cosine from which two effects look like each other
 CURVED = 0.2  # share of what an effect does, by which a start with another in its place may be off
+N_NEAREST = 2  # in the place of several effects, that are fitted
 RESEMBLING = 0.3  # cosine by probes at the nominal point, from which another is tried where the fit is
 
 
@@ -184,7 +185,7 @@ def find_look_alikes(
     model: Model,
     best: Model,
     screened: Sequence[Screened],
-    fitted: set[str],
+    fitted: set[Way],
     *,
     only_there: bool = False,
 ) -> list[Screened]:
@@ -195,38 +196,62 @@ def find_look_alikes(
     if the effect has taken the place of faults: from these no fit gets there. With `only_there` all are asked there.
     """
     effect = best.effects[-1]
-    names = [f"{effect.effect}.{name}" for name in effect.linear]
-    values = np.array([best.fit.point[name] - search.plant.neutral(name) for name in names])
-    frees = [f for f in best.fit.free if f.name in names]
-    done = stacked_jacobian(search.noise, frees, best.fit.columns, search.train) @ values
+    done = _what_is_done(search, best, [effect])
     replaced = effect.faults if model.shows_faults_of(effect) else []
     free = tuple(f for f in model.fit.free if f.name not in replaced)
     own = stacked_jacobian(search.noise, free, model.fit.columns, search.train)
-    found: dict[str, Screened] = {}
+    found: dict[Way, Screened] = {}
     asked: list[tuple[Screened, Array]] = []
     for s in screened:
         c = s.candidate
-        if c.effect in found or c.effect == effect.effect or (c.effect in fitted and not replaced):
+        if c.way in found or c.effect == effect.effect or (c.way in fitted and not replaced):
             continue
         amounts, share = _do_most(done, columns_of(search, c), own)
-        if share > COLLINEAR and c.effect not in fitted and not only_there:
-            found[c.effect] = s
+        if share > COLLINEAR and c.way not in fitted and not only_there:
+            found[c.way] = s
         elif share > RESEMBLING:
             asked.append((s, amounts))
-    begun = _start_instead(search, best, done, asked, replaced)
+    begun = _start_instead(search, best, [effect], done, asked, replaced)
     for s in _keep_alike(search, best, done, begun, near=only_there and best.excess <= DISTANT):
-        found.setdefault(s.candidate.effect, s)
+        found.setdefault(s.candidate.way, s)
     return list(found.values())
 
 
-def _start_instead(
-    search: Search, best: Model, done: Array, asked: Sequence[tuple[Screened, Array]], replaced: Sequence[str]
+def find_one_for_several(
+    search: Search, best: Model, several: Sequence[Candidate], screened: Sequence[Screened]
 ) -> list[Screened]:
-    """Candidates that begin with what by first order does what the last effect of `best` has done, in its place.
+    """The nearest that can do some of what several effects of `best` do together, begun in their place."""
+    done = _what_is_done(search, best, several)
+    own = stacked_jacobian(search.noise, strip(best, *several)[1], best.fit.columns, search.train)
+    amounts = ((s, *_do_most(done, columns_of(search, s.candidate), own)) for s in screened)
+    asked = [(s, values) for s, values, share in amounts if share > RESEMBLING]
+    begun = _start_instead(search, best, several, done, asked, ())
+    left = search.costs([s.start for s in begun], search.train, typical=False) if begun else []
+    nearest = sorted(zip(left, begun, strict=True), key=lambda entry: entry[0])
+    return [s for _, s in nearest[:N_NEAREST]]
+
+
+def _what_is_done(search: Search, best: Model, effects: Sequence[Candidate]) -> Array:
+    """What some effects of `best` do to the features of training cycles, to first order, whitened."""
+    names = [f"{c.effect}.{name}" for c in effects for name in c.linear]
+    frees = [f for f in best.fit.free if f.name in names]
+    values = np.array([best.fit.point[f.name] - search.plant.neutral(f.name) for f in frees])
+    return stacked_jacobian(search.noise, frees, best.fit.columns, search.train) @ values
+
+
+def _start_instead(
+    search: Search,
+    best: Model,
+    gone: Sequence[Candidate],
+    done: Array,
+    asked: Sequence[tuple[Screened, Array]],
+    replaced: Sequence[str],
+) -> list[Screened]:
+    """Candidates that begin with what by first order does what some effects of `best` have done, in their place.
 
     Columns of each are taken over steps as long as the values, given with it, that do it by nominal probes.
     """
-    others, rest = strip(best, best.effects[-1])[1:]
+    others, rest = strip(best, *gone)[1:]
     others = tuple(f for f in others if f.name not in replaced)
     own, limits = stacked_jacobian(search.noise, others, best.fit.columns, search.train), bounds(others, rest)
     begun = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,13 +13,13 @@ from ema.core.names import FAULTS
 from ema.discrepancy.plant import Point
 from ema.effects import registry
 
-from .candidates import Candidate, candidates, resolver_zero
+from .candidates import Candidate, Way, candidates, resolver_zero
 from .free import Free
 from .model import CHANCE, K_SEEN, Model, strip
 from .noise import Noise, Verdict
-from .screening import find_look_alikes, probe, rank_to_first_order, start_with
+from .screening import find_look_alikes, find_one_for_several, probe, rank_to_first_order, start_with
 from .verdicts import NEARLY
-from .weighing import ALIKE, DOUBTFUL, SAME, is_alike, is_credible, is_enough
+from .weighing import ALIKE, DOUBTFUL, SAME, is_alike, is_credible, is_enough, within_reach
 
 if TYPE_CHECKING:
     from .search import Search
@@ -95,8 +96,9 @@ def simplify(
     if not as_good:
         return model, v
     least, m, w, search.noise = min(as_good, key=lambda found: found[0])
-    rivals = dict.fromkeys(n.names[-1] for more, n, *_ in as_good if more - least < ALIKE * m.excess + CHANCE)
-    for n in fit_look_alikes(search, model, m, set(rivals)):
+    near = [n for more, n, *_ in as_good if more - least < ALIKE * m.excess + CHANCE]
+    rivals = dict.fromkeys(n.names[-1] for n in near)
+    for n in fit_look_alikes(search, model, m, {n.effects[-1].way for n in near}):
         if search.left_more(n, m, (search.noise,)) < ALIKE * m.excess + CHANCE and is_credible(n):
             rivals[n.names[-1]] = None
     alike.append((_in_common(m, m.effects[-1]), *(name for name in rivals if name != m.names[-1])))
@@ -164,6 +166,25 @@ def keep_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...]
     return tuple(r for r in rivals if r not in model.names and is_alike(fitted.get(r, model), model))
 
 
+def fit_one_for_several(search: Search, model: Model) -> list[Model]:
+    """Models with one effect in the place of several of `model`, where it does as well, at their minima.
+
+    Effects are added one at a time. Where the first is not there, a second may mend what it leaves: a weaker magnet
+    and a late controller did what a slow clock does.
+    """
+    found = []
+    screened = rank_to_first_order(search, model) if len(model.effects) > 1 else []
+    for n in range(2, len(model.effects) + 1):
+        for several in combinations(model.effects, n):
+            effects, frees, _ = strip(model, *several)
+            for s in find_one_for_several(search, model, several, screened):
+                free = (*frees, *s.candidate.frees)
+                made = search.model((*effects, s.candidate), free, s.start, None, 5, within_reach(model))
+                if is_alike(made, model):
+                    found.append(search.settled(made))
+    return found
+
+
 def replace_faults(search: Search, model: Model) -> list[Model]:
     """Models in which one effect stands for what several faults have in common, and as many of them vanish.
 
@@ -195,7 +216,7 @@ def drop_common_faults(search: Search, model: Model, c: Candidate) -> Model | No
     return search.model(model.effects, frees, {**model.fit.point, **rest}, model.fit.columns, 7)
 
 
-def fit_look_alikes(search: Search, model: Model, best: Model, known: set[str]) -> list[Model]:
+def fit_look_alikes(search: Search, model: Model, best: Model, known: set[Way]) -> list[Model]:
     """What can do nearly all that the last effect of `best` does in place of faults of `model`, fitted like it."""
     effects, frees, rest = strip(best, best.effects[-1])
     gone = {f.name: 0.0 for f in model.fit.free if f.name not in {g.name for g in frees}}

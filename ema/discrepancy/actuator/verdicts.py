@@ -72,14 +72,21 @@ def settle_at_minimum(search: Search, model: Model, v: Verdict, alike: list[tupl
 
 
 def _by_its_own_step(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:
-    """`model` with the step of the comparators that the record tells near the truth, and with late legs if likelier."""
+    """`model` with the step of the comparators that the record tells near the truth, and with late legs if likelier.
+
+    A step with which more than noise is left stands for what is missing, and hides it: it is not taken.
+    """
     step = tell_step(search.plant, search.noise, model.fit.point, search.train) if search.plant.step is None else None
     if step is None:
         return model, v
     usual, late = search.noise, _with_late_legs(search, model, step)
     stepped, w = _by_step(search, model, step, N_RUNS)
     if late is None or not _is_likelier(search, late, stepped, step, usual):
-        return stepped, w
+        if w.is_noise:
+            return stepped, w
+        take_step(search.plant, None)
+        search.noise = usual
+        return model, v
     take_step(search.plant, None)
     search.noise = Noise(search.plant, late.fit.point)
     late = search.model(late.effects, late.fit.free, late.fit.point, None, 2)

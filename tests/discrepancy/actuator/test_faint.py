@@ -60,7 +60,12 @@ def test_rivals_are_asked_for_where_about_noise_is_left_without_an_effect(monkey
 
     monkeypatch.setattr(faint, "fit_faint_effects", fit)
     left = {("drag", "stribeck"): 0.0, ("drag",): 0.3, ("stribeck",): 45.0, (): 48.0, ("drag", "inertia"): 0.2}
-    weighed = [SimpleNamespace(names=names, excess=excess) for names, excess in left.items()]
+
+    def fitted(names, excess=0.0):
+        effects = [SimpleNamespace(way=(name, ("size",))) for name in names]
+        return SimpleNamespace(names=names, effects=effects, excess=excess)
+
+    weighed = [fitted(names, excess) for names, excess in left.items()]
     assert faint.fit_rivals(None, weighed[0], weighed) == ["a rival"]
-    assert asked == [(("drag",), {frozenset(names) for names in left})]
-    assert faint.fit_rivals(None, SimpleNamespace(names=()), weighed) == []
+    assert asked == [(("drag",), {frozenset((name, ("size",)) for name in names) for names in left})]
+    assert faint.fit_rivals(None, fitted(()), weighed) == []

@@ -6,10 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from trials import examine_drawn
 
-from benchmarks import discrepancy, frozen, strata
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.examine import examine, shows_held_out_only
+from ema.discrepancy.actuator.examine import shows_held_out_only
 from ema.discrepancy.actuator.model import Model
 
 SEED = 1586679763  # a filter of the currents with its corner 1.3 times as high, on the light actuator; k2, k5
@@ -34,9 +33,8 @@ def test_the_split_is_turned_around_where_only_held_out_motions_show_it(motions,
 @pytest.mark.slow
 def test_a_filter_that_training_motions_do_not_show_is_named():
     """Three motions that leave 1.03 of noise and three that leave 90: fits to the first had gained nothing."""
-    a = strata.drawn("recorder", 3, SEED)
-    record = discrepancy.recorded(a.values, a.k, a.n_cycles, frozen.bench_seed(SEED), a.motions, a.bench, a.spoil)
-    findings = examine(a.actuator, prepare(a.actuator, [record])).findings
+    a, made = examine_drawn("recorder", 3, SEED)
+    findings = made.findings
     assert findings.verdict == "explained"
     (found,) = findings.effects
     assert found.name == "current_filter"
