@@ -75,11 +75,20 @@ def test_of_effects_in_one_place_the_likeliest_is_named_first():
 
 
 def test_what_is_not_unlikely_in_the_place_of_an_effect_is_told():
-    sets = {("drag", "stribeck"): 0.6, ("drag", "square"): 0.3, ("square", "stribeck"): 0.03, ("drag",): 0.07}
+    pair, other = ("viscous_drag", "stribeck"), ("quadratic_drag", "stribeck")
+    sets = {pair: 0.6, ("viscous_drag", "quadratic_drag"): 0.3, other: 0.03, ("viscous_drag",): 0.07}
     outcome = Outcome([Entry(causes, of, 0.0, 0.0) for causes, of in sets.items()], [])
-    names = ("stribeck", "drag")
-    assert likeliest.with_likely(names, [("bump", "square"), ()], outcome) == [("bump", "square"), ()]
-    assert likeliest.with_likely(names, [(), ("inertia",)], outcome) == [("square",), ("inertia",)]
+    found = likeliest.with_likely(("stribeck", "viscous_drag"), [("position_friction",), ("inertia",)], outcome)
+    assert found == [("position_friction", "quadratic_drag"), ("inertia",)]  # two were not weighed
+
+
+def test_what_does_as_well_by_misfit_and_is_unlikely_by_the_score_is_not_told():
+    pair, heavier = ("viscous_drag", "magnet_flux"), ("viscous_drag", "inertia")
+    outcome = Outcome(
+        [Entry(c, p, 0.0, 0.0) for c, p in {pair: 0.96, ("viscous_drag",): 0.02, heavier: 0.02}.items()], []
+    )
+    alike = [(), ("k3 and k4 and k5 alike", "inertia", "clock_skew")]
+    assert likeliest.with_likely(pair, alike, outcome) == [(), ("clock_skew",)]
 
 
 def test_what_was_heard_is_never_weighed_by_its_first_fit_again(monkeypatch):

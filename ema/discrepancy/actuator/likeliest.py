@@ -53,13 +53,19 @@ def led_by(names: Sequence[str], found: Sequence[str], alike: Alike) -> Alike | 
 
 
 def with_likely(names: Sequence[str], alike: Alike, outcome: Outcome) -> Alike:
-    """`alike` of each of the effects `names` with others that are not unlikely in its place, likeliest first."""
+    """What may be in the place of each of the effects `names`: of `alike` and what was weighed, if not unlikely.
+
+    What does as well by misfit and is unlikely by the score, as three equal shorts for a weaker magnet, is in no set.
+    What was not weighed stays.
+    """
     p = {frozenset(e.causes): e.probability for e in outcome.posterior}
     found = []
     for effect, rivals in zip(names, alike, strict=True):
         rest = frozenset(names) - {effect}
-        likely = [next(iter(of - rest)) for of, x in p.items() if x >= IN_SET and rest < of and len(of) == len(names)]
-        found.append(tuple(dict.fromkeys((*rivals, *(name for name in likely if name != effect)))))
+        others = [next(iter(of - rest)) for of in p if rest < of and len(of) == len(names) and effect not in of]
+        of_each = {name: p.get(rest | ({name} & set(registry()))) for name in (*rivals, *others)}
+        least = IN_SET * (p.get(rest | {effect}, 0.0) + sum(x for x in of_each.values() if x is not None))
+        found.append(tuple(name for name, x in of_each.items() if x is None or x > least))
     return found
 
 
