@@ -56,3 +56,22 @@ def test_what_is_in_the_set_that_leads_is_weighed_too(hidden, shipped_plant):
     for name, gain in gains.items():
         found, sd = outcome.sizes("current_gain")[f"current_gain.{name}"]
         assert abs(found - gain) < 3.0 * sd
+
+
+@pytest.mark.slow
+def test_of_two_ways_in_which_a_clock_may_be_off_the_likelier_stands_for_it(hidden, shipped_plant):
+    """Whichever was fitted last: the recorder's clock alone is no rival of one that the controller shares."""
+    made = hidden.cycles(hidden.Flaws(clock_skew=1e-3), 4, 31, motions=(hidden.chirp(duration=0.25),))
+    record = Record(tuple(Cycle(n, c) for n, c in enumerate(made)))
+    plant = EmaPlant(shipped_plant, prepare(shipped_plant, [record]), 2)
+    search = Search(plant, Noise(plant, {}), [0, 1], [2, 3])
+    before = start_model(search, {})
+    clocks = [c for c in candidates(shipped_plant, plant.data, ()) if c.effect == "clock_skew"]
+    ways = {c.linear: search.model((c,), (*K_FREE, *c.frees), c.probes()[0], None, 4) for c in clocks}
+    shared, own = ways["shared",], ways["rate",]
+    outcome, models = weigh_sets(search, before, shared, [own])
+    assert models[0] is shared
+    assert outcome.posterior[0].causes == ("clock_skew",)
+    assert outcome.posterior[0].probability > 0.9
+    rate, sd = outcome.sizes("clock_skew")["clock_skew.shared"]
+    assert abs(rate - 1e-3) < 3.0 * sd

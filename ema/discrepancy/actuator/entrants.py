@@ -14,7 +14,7 @@ from ema.discrepancy.engine.statistic import Whitening
 
 from .fit import columns
 from .free import K_FREE, Free, goes_with_temperature
-from .model import Model
+from .model import Model, ways_of
 from .noise import SEED, Noise
 from .problem import ActuatorProblem, as_cause
 from .weighing import within_reach
@@ -43,11 +43,12 @@ def weigh_sets(
         models = _choose_standing(search, fitted)
         found = [_entrant(search, m) for m in models]
         outcome = Contest(problem, found, _whitening(problem, search.noise), RECORDS, search.say).run(found)
-        first = {e.names: m for m, e in reversed([*zip(models, found, strict=True)])}
-        leader = first[outcome.posterior[0].causes]
+        first = {(e.names, e.parameters): m for m, e in reversed([*zip(models, found, strict=True)])}
+        ranked = [first[w.entrant.names, w.entrant.parameters] for w in outcome.weighed]
+        leader = ranked[0]
         smaller = _fit_subsets(search, leader, models)
         if not smaller:
-            return outcome, [first[entry.causes] for entry in outcome.posterior]
+            return outcome, ranked
         search.say(f"what is in {' + '.join(leader.names)}, which leads")
         fitted += smaller
 
@@ -111,13 +112,19 @@ def _fit_to_all(search: Search, answer: Model) -> list[Model]:
 def _choose_standing(search: Search, first: list[Model]) -> list[Model]:
     """The `first` models, and those of other sets of effects, those that leave least first.
 
-    Of each set its best models, however many: where they ended apart, all of them count.
+    Of each set, in each way that its effects may act, the last of the first and its best models: where they ended
+    apart, all of them count.
     """
-    sets: dict[frozenset[str], list[Model]] = {frozenset(m.names): [m] for m in first}
+    sets: dict[frozenset[str], list[Model]] = {frozenset(m.names): [] for m in first}
+    for m in reversed(first):
+        of = sets[frozenset(m.names)]
+        if ways_of(m) not in map(ways_of, of):
+            of.append(m)
     most = len(sets) + OTHERS
     for m in sorted(search.tried, key=lambda m: m.heldout):
         of = sets.setdefault(frozenset(m.names), []) if len(sets) < most else sets.get(frozenset(m.names), [])
-        if len(of) < EXPANSIONS and all(m.fit.point != other.fit.point for other in of):
+        n = sum(ways_of(m) == ways_of(other) for other in of)
+        if n < EXPANSIONS and all(m.fit.point != other.fit.point for other in of):
             of.append(m)
     return [m for of in sets.values() for m in of]
 

@@ -13,7 +13,7 @@ from ema.discrepancy.grade import IN_SET
 
 from .candidates import Way
 from .fit import stacked_jacobian
-from .model import NEAR, Model
+from .model import NEAR, Model, ways_of
 from .noise import Verdict
 from .problem import as_cause, cost_of
 from .screening import Screened, columns_of, rank_to_first_order
@@ -71,11 +71,6 @@ def _cost_to_first_order(search: Search, own: Array, s: Screened) -> float:
     names = (f"{s.candidate.effect}.{name}" for name in s.candidate.linear)
     usual = {p.name: p.usual for p in as_cause(s.candidate).parameters}
     return cost_of(s.candidate, {**usual, **dict(zip(names, sd.tolist(), strict=False))})
-
-
-def ways_of(model: Model) -> frozenset[Way]:
-    """The effects of a model and how they act."""
-    return frozenset(c.way for c in model.effects)
 
 
 def may_hide_something(model: Model, v: Verdict) -> bool:

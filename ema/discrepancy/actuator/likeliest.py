@@ -11,9 +11,9 @@ from ema.discrepancy.grade import IN_SET, NAMED
 from ema.effects import registry
 
 from .entrants import weigh_sets
-from .faint import fit_faint_effects, fit_rivals, hear, may_hide_something, ways_of
+from .faint import fit_faint_effects, fit_rivals, hear, may_hide_something
 from .forward import add_effects
-from .model import NEAR, Model
+from .model import NEAR, Model, ways_of
 from .noise import Verdict
 from .simpler import fit_alike, fit_one_for_several, keep_alike
 from .telling import probabilities

@@ -12,7 +12,7 @@ from .free import K_FREE
 if TYPE_CHECKING:
     from ema.discrepancy.plant import Point
 
-    from .candidates import Candidate
+    from .candidates import Candidate, Way
     from .fit import Fit
     from .free import Free
     from .noise import Noise
@@ -59,6 +59,11 @@ class Model:
         """Whether all of the several faults that an effect can be mistaken for are seen."""
         faults = effect.faults
         return len(faults) > 1 and all(self.fit.point.get(name, 0.0) > K_SEEN for name in faults)
+
+
+def ways_of(model: Model) -> frozenset[Way]:
+    """The effects of a model and how they act."""
+    return frozenset(c.way for c in model.effects)
 
 
 def strip(model: Model, *gone: Candidate) -> tuple[tuple[Candidate, ...], tuple[Free, ...], Point]:

@@ -179,17 +179,21 @@ class Contest:
         return Weighed(entrant, parameters, whole, own, own.log_z + log_prior(entrant.causes), error, felt)
 
     def run(self, entrants: Sequence[Entrant]) -> Outcome:
-        """All sets of causes weighed, by the first entrant of each; those near the leader by their other ones too."""
-        sets: dict[tuple[str, ...], list[Entrant]] = {}
+        """All sets of causes weighed, by the first entrant of each; those near the leader by their other ones too.
+
+        Of causes that may act in several ways, by other parameters, each way is weighed, and the likeliest stands.
+        """
+        ways: dict[tuple[tuple[str, ...], frozenset[str]], list[Entrant]] = {}
         for e in entrants:
-            sets.setdefault(tuple(sorted(e.names)), []).append(e)
-        found = dict(zip(sets, self.weigh([of[0] for of in sets.values()]), strict=True))
+            ways.setdefault((tuple(sorted(e.names)), frozenset(e.parameters)), []).append(e)
+        found = dict(zip(ways, self.weigh([of[0] for of in ways.values()]), strict=True))
         top = max(w.log_evidence for w in found.values())
-        for key, of in sets.items():
-            if top - found[key].log_evidence < BEHIND:
+        for way, of in ways.items():
+            if top - found[way].log_evidence < BEHIND:
                 alike = [e for e in of[1:] if e.parameters == of[0].parameters][: EXPANSIONS - 1]
-                found[key] = average([self.settled(w) for w in (found[key], *self.weigh(alike))])
-        ranked = sorted(found.values(), key=lambda w: -w.log_evidence)
+                found[way] = average([self.settled(w) for w in (found[way], *self.weigh(alike))])
+        sets = {names: w for (names, _), w in sorted(found.items(), key=lambda item: item[1].log_evidence)}
+        ranked = sorted(sets.values(), key=lambda w: -w.log_evidence)
         error = float(np.sqrt(np.mean([w.error**2 for w in ranked[:2]])))
         return Outcome(posterior({w.entrant.names: w.log_evidence for w in ranked}, error), ranked)
 
