@@ -132,6 +132,25 @@ def resume(search: Search, path: Path) -> None:
     search.plant.late = path.late
 
 
+def put_one_in_place_of_faults(
+    search: Search, before: Model, v: Verdict, alike: list[tuple[str, ...]]
+) -> tuple[Model, Verdict]:
+    """`before`, or one effect for what several of its faults have in common, if that leaves noise by its own.
+
+    Beside these faults a fit goes astray near the data: by the noise that they make, it sees little of the direction
+    between them and the effect.
+    """
+    if v.is_noise:
+        return before, v
+    noise, sets = search.noise, list(alike)
+    made, w = simplify(search, before, before, v, sets, [])
+    if w.is_noise:
+        alike[:] = sets
+        return made, w
+    search.noise = noise
+    return before, v
+
+
 def _go(search: Search, begun: Path) -> Path:
     """A path to its end: what explains the cycles."""
     resume(search, begun)
@@ -140,7 +159,9 @@ def _go(search: Search, begun: Path) -> Path:
         before, verdict_before = take_bench_conditions(search, before, verdict_before, PLAIN)
     search.say(f"faults only: p = {verdict_before.p_value:.2g}, most visible: {verdict_before.loudest}")
     alike, as_well = list(begun.alike), list(begun.as_well)
-    after, v = (begun.after, begun.verdict) if begun.after.effects else (before, verdict_before)
+    after, v = begun.after, begun.verdict
+    if not begun.after.effects:
+        after, v = put_one_in_place_of_faults(search, before, verdict_before, alike)
     after, v = add_effects(search, before, after, v, alike)
     if not v.is_noise:
         after, v = exchange_earlier_effects(search, after, v, alike)
