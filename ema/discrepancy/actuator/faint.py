@@ -53,8 +53,10 @@ def fit_faint_effects(
     nats: dict[Way, tuple[float, Screened]] = {}
     for s in rank_to_first_order(search, model):
         way = s.candidate.way
+        if ways_of(model) | {way} in known:
+            continue
         gain = 0.5 * (model.fit.cost - s.promised) - _cost_to_first_order(search, own, s)
-        if ways_of(model) | {way} not in known and gain > max(0.0, nats.get(way, (0.0, s))[0]):
+        if gain > max(0.0, nats.get(way, (0.0, s))[0]):
             nats[way] = gain, s
     best: dict[str, Model] = {}
     for _, s in sorted(nats.values(), key=lambda of: -of[0])[:n]:

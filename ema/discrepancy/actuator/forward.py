@@ -277,7 +277,8 @@ def _fit_most_promising(
             ):
                 break
         if s.candidate.way not in {*known, *found}:
-            guessed |= set() if s.candidate.is_seen else {s.candidate.effect}
+            if not s.candidate.is_seen:
+                guessed.add(s.candidate.effect)
             best = min(found.values(), key=lambda m: m.heldout, default=None)
             found[s.candidate.way] = m = _fit_candidate(search, model, s, within_reach(best) if best else np.inf)
             if leaves_noise(search, m):
