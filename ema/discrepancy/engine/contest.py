@@ -18,6 +18,7 @@ from .hypothesis import Array, Cause, Parameter, Point, Problem
 from .law_error import SHARES, LawError
 from .posterior import Entry, log_prior, posterior
 from .records import Pool, Simulated, simulate
+from .secants import learn_from
 from .statistic import Prediction, Statistic, Whitening
 
 Say = Callable[[str], None]
@@ -60,16 +61,24 @@ class Entrant:
 class Weighed:
     """An entrant with its evidence, prior included, and that one's own error. [nats]
 
-    `felt` is the squared step from where it was simulated to where its evidence says it is, in deviations of a record.
+    `predictions` are by all records and by either half of them, `columns` those of the statistics, shape (d, n_faults +
+    n_parameters). `felt` is the squared step from where it was simulated to where its evidence says it is, in
+    deviations of a record.
     """
 
     entrant: Entrant
     parameters: tuple[Parameter, ...]
-    prediction: Prediction
+    predictions: tuple[Prediction, ...]
+    columns: Array
     evidence: Evidence
     log_evidence: float
     error: float
     felt: float
+
+    @property
+    def at(self) -> Array:
+        """Where it was simulated, shape (n_faults + n_parameters,)."""
+        return np.array([self.entrant.point.get(p.name, p.neutral) for p in self.parameters])
 
     @property
     def name(self) -> str:
@@ -144,7 +153,7 @@ class Contest:
         freedom = (n_records - problem.grids) * len(problem.blocks)
         self.statistic = Statistic.of(self.whitening, directions.T, freedom)
         self.law_error = LawError(self.d, 0.0, 0.0)
-        left = self.weigh(entrants[:1])[0].prediction
+        left = self.weigh(entrants[:1])[0].predictions[0]
         self.law_error = LawError.of(left.mean, left.rest - left.rest_mean)
 
     @property
@@ -158,12 +167,15 @@ class Contest:
         return [self._weighed(e, r) for e, r in zip(entrants, records, strict=True)]
 
     def _weighed(self, entrant: Entrant, records: Simulated) -> Weighed:
-        parameters = (*self.problem.faults, *(p for c in entrant.causes for p in c.parameters))
         J = self.statistic.basis.T @ self.whitening.white(entrant.columns.T).T
+        parts = (records, *_halves(records))
+        predictions = (Prediction.of(self.statistic, part, self.problem.measured) for part in parts)
+        return self._integrated(entrant, tuple(predictions), J)
+
+    def _integrated(self, entrant: Entrant, predictions: tuple[Prediction, ...], J: Array) -> Weighed:
+        parameters = (*self.problem.faults, *(p for c in entrant.causes for p in c.parameters))
         x = np.array([entrant.point.get(p.name, p.neutral) - p.neutral for p in parameters])
-        whole, *halves = (
-            Prediction.of(self.statistic, part, self.problem.measured) for part in (records, *_halves(records))
-        )
+        whole, *halves = predictions
         shares = SHARES if self.law_error.left > 0.0 else SHARES[:1]
 
         def of(prediction: Prediction) -> Evidence:
@@ -176,7 +188,7 @@ class Contest:
         step = J @ (own.mean - x)
         felt = float(step @ np.linalg.solve(whole.covariance, step))
         error = abs(moved[0] - moved[1]) / 2.0
-        return Weighed(entrant, parameters, whole, own, own.log_z + log_prior(entrant.causes), error, felt)
+        return Weighed(entrant, parameters, predictions, J, own, own.log_z + log_prior(entrant.causes), error, felt)
 
     def run(self, entrants: Sequence[Entrant]) -> Outcome:
         """All sets of causes weighed, by the first entrant of each; those near the leader by their other ones too.
@@ -191,21 +203,31 @@ class Contest:
         for way, of in ways.items():
             if top - found[way].log_evidence < BEHIND:
                 alike = [e for e in of[1:] if e.parameters == of[0].parameters][: EXPANSIONS - 1]
-                found[way] = average([self.settled(w) for w in (found[way], *self.weigh(alike))])
+                found[way] = average(self.explored([found[way], *self.weigh(alike)]))
         sets = {names: w for (names, _), w in sorted(found.items(), key=lambda item: item[1].log_evidence)}
         ranked = sorted(sets.values(), key=lambda w: -w.log_evidence)
         error = float(np.sqrt(np.mean([w.error**2 for w in ranked[:2]])))
         return Outcome(posterior({w.entrant.names: w.log_evidence for w in ranked}, error), ranked)
 
-    def settled(self, w: Weighed) -> Weighed:
-        """An entrant weighed where its own evidence says it is: simulated there where that is not near."""
+    def explored(self, seen: Sequence[Weighed]) -> list[Weighed]:
+        """Points of one set of causes, by columns that agree with all of them.
+
+        The likeliest is simulated anew where its own evidence says it is, where that is not near.
+        """
+        seen = self._agreeing(seen)
         for _ in range(TURNS):
+            w = max(seen, key=lambda w: w.log_evidence)
             if w.felt < float(chi2.isf(OUTSIDE, len(w.parameters))):
                 break
             (moved,) = self.weigh([replace(w.entrant, point={**w.entrant.point, **w.point})])
             self.say(f"{w.name}, simulated anew: {moved.log_evidence - w.log_evidence:+.1f} nats")
-            w = moved
-        return w
+            seen = self._agreeing([*seen, replace(moved, columns=w.columns)])
+        return seen
+
+    def _agreeing(self, seen: Sequence[Weighed]) -> list[Weighed]:
+        points = np.array([w.at for w in seen])
+        means = np.array([[w.predictions[half].mean for w in seen] for half in (1, 2)])
+        return [self._integrated(w.entrant, w.predictions, learn_from(w.columns, points, means)) for w in seen]
 
 
 def average(found: Sequence[Weighed]) -> Weighed:

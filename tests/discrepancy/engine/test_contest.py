@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -134,6 +135,24 @@ def test_where_a_response_is_not_linear_the_interval_holds_what_other_points_say
             found.append((mean - truth) / sd)
     assert np.mean(np.square(together)) < 0.6 * np.mean(np.square(alone))
     assert np.max(np.abs(together)) < 4.0
+
+
+def test_a_direction_that_is_hardly_felt_is_told_no_better_than_points_along_it_say(toys):
+    """Columns of a and b that nearly cancel, by noisy differences: each point claims to know its place."""
+    alone, together = [], []
+    for seed in range(24):
+        toy = toys.plant(1, NAMES, seed=seed, usual=100.0)
+        rng = np.random.default_rng([seed, 7])
+        toy.columns["b.size"] = toy.columns["a.size"] + 0.02 * toy.columns["b.size"]
+        toy.measured = toy.measured + toy.mean({"a.size": 50.0, "b.size": -20.0})
+        ended = 30.0 * rng.choice([-1.0, 1.0]) + np.array([-8.0, 2.0, 8.0])  # along the ridge, to one side
+        points = [entrant(toy, "a", "b", **{"a.size": 50.0 + x, "b.size": -20.0 - x}) for x in ended]
+        points = [replace(p, columns=p.columns + 0.1 * rng.standard_normal(p.columns.shape)) for p in points]
+        for of, found in ((points[1:2], alone), (points, together)):
+            mean, sd = held(toy, entrant(toy), *of).sizes("b")["b.size"]
+            found.append((mean + 20.0) / sd)
+    assert np.sqrt(np.mean(np.square(alone))) > 3.0
+    assert np.sqrt(np.mean(np.square(together))) < 1.5
 
 
 def test_whitening_by_ones_own_records_is_refused(toys):
