@@ -95,15 +95,17 @@ def test_what_was_heard_is_never_weighed_by_its_first_fit_again(monkeypatch):
     """Of two models of one set the last stands for both, and only the settled one is at its minimum."""
 
     def model(*names, **more):
-        return SimpleNamespace(names=names, effects=names, excess=0.0, **more)
+        return SimpleNamespace(names=names, effects=names, excess=0.0, is_full=False, **more)
 
-    nothing, first, other, settled, rival = (
+    nothing, first, other, settled, beside, rival = (
         model(),
         model("clock_skew"),
         model("cogging"),
         model("clock_skew"),
+        model("clock_skew", "play"),
         model("inertia"),
     )
+    noise = SimpleNamespace(is_noise=True)
     outcome = Outcome([Entry(("clock_skew",), 1.0, 0.0, 0.0)], [])
     weighed = []
 
@@ -112,18 +114,18 @@ def test_what_was_heard_is_never_weighed_by_its_first_fit_again(monkeypatch):
         return outcome, [answer]
 
     for name, does in {
-        "fit_faint_effects": lambda search, m: [first, other],
+        "fit_faint_effects": lambda search, m: [first, other] if m is nothing else [beside],
         "weigh_sets": weigh_sets,
-        "hear": lambda outcome, models: (first, ()),
-        "_go_on_from_heard": lambda *of: likeliest.Answer(settled, None, [()]),
+        "hear": lambda outcome, models, found: (first, ()) if found is nothing else None,
+        "_go_on_from_heard": lambda *of: likeliest.Answer(settled, noise, [()]),
         "_fit_unweighed": lambda *of: [rival],
         "keep_alike": lambda search, m, j, rivals: rivals,
     }.items():
         monkeypatch.setattr(likeliest, name, does)
-    quiet = likeliest.Answer(nothing, SimpleNamespace(is_noise=True), [])
+    quiet = likeliest.Answer(nothing, noise, [])
     _, answer, _ = likeliest.take_likeliest(None, SimpleNamespace(before=nothing), quiet)
     assert answer.model is settled
-    assert weighed == [(nothing, [first, other]), (settled, [other]), (settled, [other, rival])]
+    assert weighed == [(nothing, [first, other]), (settled, [other, beside]), (settled, [other, beside, rival])]
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.records import Array
-from ema.discrepancy.engine.contest import Outcome
+from ema.discrepancy.engine.contest import BEHIND, Outcome
 from ema.discrepancy.grade import IN_SET
 
 from .candidates import Way
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 N_FITTED = 6  # likeliest effects that are fitted; of one that may act in two ways, both
 N_RIVALS = 3  # the same in the place of what was found
 SURE = 0.95  # probability that something is there, from which a record that leaves about noise is not adequate
+LEAST = float(np.log(SURE / (1.0 - SURE)))  # [nats] that an effect must promise, else it cannot make sure
 
 
 def fit_rivals(search: Search, answer: Model, weighed: Sequence[Model]) -> list[Model]:
@@ -36,15 +37,15 @@ def fit_rivals(search: Search, answer: Model, weighed: Sequence[Model]) -> list[
     smaller = [m for m in weighed if len(m.names) == len(answer.names) - 1 and set(m.names) < set(answer.names)]
     known = {ways_of(m) for m in weighed}
     near = [m for m in {m.names: m for m in reversed(smaller)}.values() if m.excess < NEAR]
-    return [rival for m in near for rival in fit_faint_effects(search, m, N_RIVALS, known)]
+    return [rival for m in near for rival in fit_faint_effects(search, m, N_RIVALS, 0.0, known)]
 
 
 def fit_faint_effects(
-    search: Search, model: Model, n: int = N_FITTED, known: Container[frozenset[Way]] = ()
+    search: Search, model: Model, n: int = N_FITTED, least: float = LEAST, known: Container[frozenset[Way]] = ()
 ) -> list[Model]:
-    """`model` with one effect each that promises, to first order, to be likelier than not; the likeliest `n`.
+    """`model` with one effect each that promises, to first order, `least` nats beyond its cost; the likeliest `n`.
 
-    Sets of ways to act that are `known` are passed over.
+    Sets of ways to act that are `known` are passed over, and what promises far less than the likeliest.
 
     A test of squares asks whether anything is left along thousands of features. A clock that is 0.07 % off leaves 1.3
     times what noise does there, which may be chance, and at its minimum is sixty nats likelier than none.
@@ -56,10 +57,12 @@ def fit_faint_effects(
         if ways_of(model) | {way} in known:
             continue
         gain = 0.5 * (model.fit.cost - s.promised) - _cost_to_first_order(search, own, s)
-        if gain > max(0.0, nats.get(way, (0.0, s))[0]):
+        if gain > max(least, nats.get(way, (least, s))[0]):
             nats[way] = gain, s
     best: dict[str, Model] = {}
-    for _, s in sorted(nats.values(), key=lambda of: -of[0])[:n]:
+    top = max((gain for gain, _ in nats.values()), default=0.0)
+    near = [(gain, s) for gain, s in nats.values() if gain > top - BEHIND]
+    for _, s in sorted(near, key=lambda of: -of[0])[:n]:
         frees = (*model.fit.free, *s.candidate.frees)
         m = search.model((*model.effects, s.candidate), frees, s.start, None, 4)
         best[s.candidate.effect] = min(m, best.get(s.candidate.effect, m), key=lambda m: m.fit.misfit)
@@ -76,15 +79,16 @@ def _cost_to_first_order(search: Search, own: Array, s: Screened) -> float:
 
 
 def may_hide_something(model: Model, v: Verdict) -> bool:
-    """Whether nothing was found and what is left is noise or near it: the score is to say then."""
-    return not model.effects and (v.is_noise or model.excess < NEAR)
+    """Whether what is left is noise or near it, and one more effect may be there: the score is to say then."""
+    return not model.is_full and (v.is_noise or model.excess < NEAR)
 
 
-def hear(outcome: Outcome, models: list[Model]) -> tuple[Model, tuple[str, ...]] | None:
-    """The likeliest model of one effect and the others that it may be, where the score is sure that one is there."""
-    p = {e.causes[0]: e.probability for e in outcome.posterior if len(e.causes) == 1}
-    nothing = sum(e.probability for e in outcome.posterior if not e.causes)
-    first = next((m for m in models if len(m.names) == 1), None)
-    if first is None or nothing > 1.0 - SURE or not is_credible(first):
+def hear(outcome: Outcome, models: list[Model], found: Model) -> tuple[Model, tuple[str, ...]] | None:
+    """The likeliest model of one effect more than `found` and the others that it may be, where the score is sure."""
+    names = set(found.names)
+    more = {e.causes: e.probability for e in outcome.posterior if names < set(e.causes)}
+    first = next((m for m in models if names < set(m.names) and len(m.names) == len(names) + 1), None)
+    if first is None or sum(more.values()) < SURE or not is_credible(first):
         return None
-    return first, tuple(name for name, x in p.items() if name != first.names[0] and x >= IN_SET)
+    others = [(set(of) - names, p) for of, p in more.items() if len(of) == len(first.names)]
+    return first, tuple(name for new, p in others for name in new - set(first.names) if p >= IN_SET)

@@ -81,16 +81,19 @@ class Answer:
 def take_likeliest(search: Search, path: Path, found: Answer) -> tuple[Outcome, Answer, list[str]]:
     """All sets weighed; the likeliest where what was found has an effect less likely than not; and notes.
 
-    Where faults alone leave about noise, what the score hears all the same is taken for found. Of effects that may
-    stand in each other's place the likeliest comes first.
+    Where about noise is left, what the score hears all the same is taken for found. Of effects that may stand in each
+    other's place the likeliest comes first.
     """
-    is_quiet = may_hide_something(found.model, found.verdict)
-    others = fit_faint_effects(search, found.model) if is_quiet else []
-    outcome, models = weigh_sets(search, path.before, found.model, others)
-    if is_quiet and (heard := hear(outcome, models)) is not None:
-        found = _go_on_from_heard(search, path, *heard)
-        others = [m for m in others if m.names != found.model.names]  # its own first fit, not at the minimum
+    others: list[Model] = []
+    while True:
+        faint = fit_faint_effects(search, found.model) if may_hide_something(found.model, found.verdict) else []
+        others = [m for m in others if not set(m.names) <= set(found.model.names)]  # first fits, not at the minimum
+        others += faint
         outcome, models = weigh_sets(search, path.before, found.model, others)
+        heard = hear(outcome, models, found.model) if faint else None
+        if heard is None:
+            break
+        found = _go_on_from_heard(search, path, found, *heard)
     if rivals := _fit_unweighed(search, found, models):
         outcome, models = weigh_sets(search, path.before, found.model, [*others, *rivals])
     sets = [(name, *rivals) for name, rivals in zip(found.model.names, found.alike, strict=True)]
@@ -121,10 +124,11 @@ def _fit_unweighed(search: Search, found: Answer, weighed: Sequence[Model]) -> l
     return [*alike, *fit_rivals(search, found.model, [*weighed, *alike])]
 
 
-def _go_on_from_heard(search: Search, path: Path, model: Model, rivals: tuple[str, ...]) -> Answer:
-    """What the score has heard, at its minimum, and what there is to be found beside it."""
-    search.say(f"{model.names[0]}: faults alone leave about noise, and the score is sure of more")
-    alike = [rivals]
+def _go_on_from_heard(search: Search, path: Path, found: Answer, model: Model, rivals: tuple[str, ...]) -> Answer:
+    """What the score has heard beside what was `found`, at its minimum, and what there is to be found beside both."""
+    left = " + ".join(found.model.names) or "faults alone"
+    search.say(f"{model.names[-1]}: {left} leave about noise, and the score is sure of more")
+    alike = [*found.alike, rivals]
     model, v = settle_at_minimum(search, model, search.verdict(model), alike)
     if not v.is_noise:
         model, v = add_effects(search, path.before, model, v, alike)

@@ -7,15 +7,20 @@ from types import SimpleNamespace
 import pytest
 
 from ema.discrepancy.actuator import faint
+from ema.discrepancy.actuator.model import Model
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.engine.posterior import Entry
 
 
-def weighed(**p):
-    """Posterior of sets by their names, `nothing` for faults alone, and a model of each."""
-    names = {name: () if name == "nothing" else (name,) for name in p}
+def model(*names):
+    return SimpleNamespace(names=names)
+
+
+def weighed(beside=(), **p):
+    """Posterior of sets by what is in them beside the effects given, `nothing` for these alone; a model of each."""
+    names = {name: beside if name == "nothing" else (*beside, name) for name in p}
     outcome = Outcome([Entry(names[name], x, 0.0, 0.0) for name, x in p.items()], [])
-    return outcome, [SimpleNamespace(names=of) for of in names.values()]
+    return outcome, [model(*of) for of in names.values()]
 
 
 @pytest.fixture(autouse=True)
@@ -23,17 +28,27 @@ def credible(monkeypatch):
     monkeypatch.setattr(faint, "is_credible", lambda model: "incredible" not in model.names)
 
 
-def test_what_is_sure_is_told_with_all_that_it_may_be():
-    model, others = faint.hear(*weighed(clock_skew=0.7, inertia=0.26, cogging=0.03, nothing=0.01))
-    assert model.names == ("clock_skew",)
+@pytest.mark.parametrize("found", [(), ("supply_sag",), ("supply_sag", "stribeck")])
+def test_what_is_sure_is_told_with_all_that_it_may_be(found):
+    """Beside nothing, or beside what was found."""
+    sets = weighed(found, clock_skew=0.7, inertia=0.26, cogging=0.03, nothing=0.01)
+    heard, others = faint.hear(*sets, model(*found))
+    assert heard.names == (*found, "clock_skew")
     assert others == ("inertia",)
 
 
-def test_nothing_is_told_where_faults_alone_may_do_or_what_leads_is_no_cause():
-    assert faint.hear(*weighed(nothing=0.999, cogging=0.001)) is None
-    assert faint.hear(*weighed(clock_skew=0.9, nothing=0.1)) is None  # likelier, and not sure
-    assert faint.hear(*weighed(incredible=0.99, nothing=0.01)) is None
-    assert faint.hear(*weighed(nothing=1.0)) is None
+def test_nothing_is_told_where_what_was_found_may_do_or_what_leads_is_no_cause():
+    for found in ((), ("supply_sag",)):
+        of = model(*found)
+        assert faint.hear(*weighed(found, nothing=0.999, cogging=0.001), of) is None
+        assert faint.hear(*weighed(found, clock_skew=0.9, nothing=0.1), of) is None  # likelier, and not sure
+        assert faint.hear(*weighed(found, incredible=0.99, nothing=0.01), of) is None
+        assert faint.hear(*weighed(found, nothing=1.0), of) is None
+
+
+def test_what_stands_in_the_place_of_what_was_found_is_not_more():
+    outcome, models = weighed(clock_skew=0.98, inertia=0.02)
+    assert faint.hear(outcome, models, model("cogging")) is None
 
 
 @pytest.mark.parametrize(
@@ -42,19 +57,21 @@ def test_nothing_is_told_where_faults_alone_may_do_or_what_leads_is_no_cause():
         ((), True, 0.0, True),
         ((), False, 0.3, True),  # a test says more than noise, and no effect gained enough by a search
         ((), False, 5.0, False),  # far more: what could say what it is has been fitted
-        (("inertia",), True, 0.0, False),
+        (("inertia",), True, 0.0, True),  # a further one may be too faint for a test
+        (("inertia",), False, 5.0, False),
+        (("inertia", "stribeck", "cogging"), True, 0.0, False),  # no more are looked for
     ],
 )
-def test_the_score_is_asked_where_nothing_was_found_in_about_noise(effects, is_noise, left, expected):
-    model, verdict = SimpleNamespace(effects=effects, excess=left), SimpleNamespace(is_noise=is_noise)
-    assert faint.may_hide_something(model, verdict) == expected
+def test_the_score_is_asked_where_about_noise_is_left(effects, is_noise, left, expected):
+    answer = Model(tuple(SimpleNamespace(effect=name) for name in effects), None, 1.0 + left)
+    assert faint.may_hide_something(answer, SimpleNamespace(is_noise=is_noise)) == expected
 
 
 def test_rivals_are_asked_for_where_about_noise_is_left_without_an_effect(monkeypatch):
     """Beside the drag: without it far more than noise is left, and first order says nothing there."""
     asked = []
 
-    def fit(search, model, n, known):
+    def fit(search, model, n, least, known):
         asked.append((model.names, known))
         return ["a rival"]
 
