@@ -96,17 +96,22 @@ def _fit_to_all(search: Search, answer: Model) -> list[Model]:
     """Sets that leave no more of training cycles than the answer, fitted to all where others hold motions of their own.
 
     One motion may not tell two causes apart which two motions do: then the held-out one speaks of what it was not
-    asked for. Of each set the model that leaves least of training cycles.
+    asked for. Of each set the model that leaves least of training cycles, or that was fitted to all before.
     """
     motion = search.plant.data.motion
     if set(motion[search.heldout]) <= set(motion[search.train]):
         return []
     best: dict[frozenset[str], Model] = {}
+    done: dict[frozenset[str], Model] = {}
     for m in search.tried:
         key = frozenset(m.names)
-        if m.fit.misfit < min(within_reach(answer), best[key].fit.misfit if key in best else np.inf):
+        if len(m.fit.residuals) == search.plant.data.n_cycles:
+            done[key] = m
+        elif m.fit.misfit < min(within_reach(answer), best[key].fit.misfit if key in best else np.inf):
             best[key] = m
-    return [search.fitted_to_all(m) for m in best.values()]
+            done.pop(key, None)  # of a worse start
+    known = {key: m for key, m in done.items() if m.by is search.noise}
+    return [known[key] if key in known else search.fitted_to_all(m) for key, m in best.items()]
 
 
 def _choose_standing(search: Search, first: list[Model]) -> list[Model]:
