@@ -21,7 +21,7 @@ EFFECT = Effect(
             "relative change of the time constants of the anti-alias stages; -1: none",
         ),
     ),
-    sentence="the time constants of the anti-alias filter of the recorded currents differ by {change:+.0%}",
+    sentence="the time constants of the anti-alias filter of the recorded currents differ by {change:+z.0%}",
     separated_by="a step of current with the rotor locked",
     mistaken_for=(),
     plants=("ema",),

@@ -16,7 +16,7 @@ def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
 EFFECT = Effect(
     name="drive_gain",
     parameters=(Parameter("gain", "1", 0.0, -0.3, 0.3, 0.03, "relative gain error of the recorded drive"),),
-    sentence="the recorded drive (current, voltage or force) reads {gain:+.2%} of its true value",
+    sentence="the recorded drive (current, voltage or force) reads {gain:+z.2%} of its true value",
     separated_by="a known load (weight on a lever), or a second sensor",
     mistaken_for=("k1",),
     plants=("axis",),

@@ -18,7 +18,7 @@ def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
 EFFECT = Effect(
     name="inertia",
     parameters=(Parameter("change", "1", 0.0, -0.8, 3.0, 0.05, "relative change of inertia or mass"),),
-    sentence="the moving inertia differs by {change:+.2%}",
+    sentence="the moving inertia differs by {change:+z.2%}",
     separated_by="weighing, or a known load that changes only the torque",
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema", "axis"),

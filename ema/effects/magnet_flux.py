@@ -36,7 +36,7 @@ EFFECT = Effect(
         ),
     ),
     sentence="magnet flux changed",
-    besides={"change": " by {change:+.1%}", "per_kelvin": " by {per_kelvin:+.2%} per kelvin above 20 °C"},
+    besides={"change": " by {change:+z.1%}", "per_kelvin": " by {per_kelvin:+z.2%} per kelvin above 20 °C"},
     separated_by="the same motion at another temperature; voltage at known speed",
     laws={"emf_factor": emf_factor},
     mistaken_for=("k3", "k4", "k5"),

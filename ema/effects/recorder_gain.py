@@ -12,7 +12,7 @@ EFFECT = Effect(
         Parameter("gain_b", "1", 0.0, -0.1, 0.1, 0.01, "relative gain error of the recorded current of phase B"),
         Parameter("gain_c", "1", 0.0, -0.1, 0.1, 0.01, "relative gain error of the recorded current of phase C"),
     ),
-    sentence="the recorder reads {gain_a:+.1%}, {gain_b:+.1%}, {gain_c:+.1%} (phases A, B, C) of the true current; "
+    sentence="the recorder reads {gain_a:+z.1%}, {gain_b:+z.1%}, {gain_c:+z.1%} (phases A, B, C) of the true current; "
     "the controller does not",
     separated_by="all three phase currents at rest under load, recorded and as the controller sees them",
     mistaken_for=("k3", "k4", "k5"),

@@ -28,7 +28,7 @@ EFFECT = Effect(
         Parameter("per_kelvin", "1/K", 0.0, 0.0, 0.006, 0.0039, "relative change per kelvin above 20 °C"),
     ),
     sentence="winding resistance changed",
-    besides={"change": " by {change:+.1%}", "per_kelvin": " by {per_kelvin:+.2%} per kelvin above 20 °C"},
+    besides={"change": " by {change:+z.1%}", "per_kelvin": " by {per_kelvin:+z.2%} per kelvin above 20 °C"},
     separated_by="phase voltage at known current, or a motion at the voltage limit",
     laws={"resistance_factor": factor},
     plants=("ema", "axis"),

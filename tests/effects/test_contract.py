@@ -79,6 +79,11 @@ def test_only_what_is_not_neutral_is_said():
     assert flux.said({"change": -0.05, "per_kelvin": -0.001}) == both
 
 
+def test_what_is_rounded_to_nothing_has_no_sign_but_a_plus():
+    gains = registry()["recorder_gain"].said({"gain_a": -0.0002, "gain_b": 0.0002, "gain_c": -0.012})
+    assert "+0.0%, +0.0%, -1.2%" in gains
+
+
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
 def test_laws_are_neutral_at_their_neutral_values(effect):
     rng = np.random.default_rng(1)
