@@ -17,15 +17,15 @@ from benchmarks.discrepancy import recorded
 from benchmarks.frozen import bench_seed, commit, seed
 from benchmarks.strata import as_actuator
 from ema.core.names import FAULTS
-from ema.discrepancy.actuator.comparators import take_step, tell_step
-from ema.discrepancy.actuator.conditions import take_recorded_conditions
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import split
-from ema.discrepancy.actuator.fit import fit
-from ema.discrepancy.actuator.flat import settle
-from ema.discrepancy.actuator.free import K_FREE, free
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
+from ema.discrepancy.actuator.fitting.comparators import take_step, tell_step
+from ema.discrepancy.actuator.fitting.fit import fit
+from ema.discrepancy.actuator.fitting.flat import settle
+from ema.discrepancy.actuator.fitting.free import K_FREE, free
+from ema.discrepancy.actuator.reading.conditions import take_recorded_conditions
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 
 CASES = ("viscous_drag", "magnet_flux", "recorder_gain", "current_gain")
 APART = 0.1  # of a parameter's step, rms, by which a fit begins beside the truth

@@ -25,8 +25,8 @@ from ema.core.errors import RecordError
 from ema.core.names import FAULTS
 from ema.core.records import Cycle, Record
 from ema.core.version import version
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
+from ema.discrepancy.actuator.reading.cycles import prepare
 from ema.models.actuator import Actuator
 
 CONFIDENT = 0.9

@@ -22,8 +22,8 @@ from ema.bundle import Bundle
 from ema.core import config, resources
 from ema.core.records import Cycle, Record
 from ema.core.status import Reason
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
+from ema.discrepancy.actuator.reading.cycles import prepare
 from ema.discrepancy.extended import write_extended
 from ema.models.actuator import Actuator
 

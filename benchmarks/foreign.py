@@ -20,8 +20,8 @@ from benchmarks.frozen import commit
 from benchmarks.kernel import costs
 from ema.core import config, resources
 from ema.core.records import Record, read_record
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
+from ema.discrepancy.actuator.reading.cycles import prepare
 from ema.discrepancy.progress import Progress
 from ema.models.actuator import Actuator
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ema.core import config, resources
-from ema.discrepancy.actuator.runs import Work
+from ema.discrepancy.actuator.simulating.runs import Work
 from ema.effects import registry
 from ema.models import hf, lf1
 from ema.models.actuator import Actuator

@@ -20,10 +20,10 @@ from benchmarks import strata
 from benchmarks.discrepancy import recorded
 from benchmarks.frozen import bench_seed, read_rows
 from ema.core.names import FAULTS
-from ema.discrepancy.actuator.conditions import take_recorded_conditions
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
+from ema.discrepancy.actuator.reading.conditions import take_recorded_conditions
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 from ema.discrepancy.plant import Point
 
 STEPS = (2.5e-7, 4e-7, 5e-7, 8e-7, 1e-6, 2e-6)  # [s] means of a search are by 0.8 and 1 µs in turn

@@ -9,7 +9,7 @@ import pytest
 
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import prepare
+from ema.discrepancy.actuator.reading.cycles import prepare
 
 
 @pytest.fixture(scope="module")

@@ -8,18 +8,22 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine, split
-from ema.discrepancy.actuator.forward import exchange_earlier_effects, fit_with_one_more, try_other_first_effects
-from ema.discrepancy.actuator.free import K_FREE
-from ema.discrepancy.actuator.growing import is_steady
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.paths import Path, retry_with_steady_faults
-from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.screening import rank_by_simulation, rank_to_first_order
-from ema.discrepancy.actuator.search import Search, start_model
-from ema.discrepancy.actuator.verdicts import settle_at_minimum
+from ema.discrepancy.actuator.finding.forward import (
+    exchange_earlier_effects,
+    fit_with_one_more,
+    try_other_first_effects,
+)
+from ema.discrepancy.actuator.finding.paths import Path, retry_with_steady_faults
+from ema.discrepancy.actuator.finding.screening import rank_by_simulation, rank_to_first_order
+from ema.discrepancy.actuator.finding.verdicts import settle_at_minimum
+from ema.discrepancy.actuator.fitting.candidates import candidates
+from ema.discrepancy.actuator.fitting.free import K_FREE
+from ema.discrepancy.actuator.fitting.growing import is_steady
+from ema.discrepancy.actuator.fitting.search import Search, start_model
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 
 
 def hide(hidden, n=3, seed=1, **flaws: float) -> Record:

@@ -10,14 +10,19 @@ from scipy.ndimage import uniform_filter1d
 
 from ema.core import config, resources
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.conditions import current_noise, position_noise, supply_voltage, take_recorded_conditions
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
-from ema.discrepancy.actuator.fit import excess_at
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import CARRIED, EmaPlant
-from ema.discrepancy.actuator.play import find_pressing_load
-from ema.discrepancy.actuator.zeros import zero_apart
+from ema.discrepancy.actuator.fitting.fit import excess_at
+from ema.discrepancy.actuator.reading.conditions import (
+    current_noise,
+    position_noise,
+    supply_voltage,
+    take_recorded_conditions,
+)
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.reading.play import find_pressing_load
+from ema.discrepancy.actuator.reading.zeros import zero_apart
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import CARRIED, EmaPlant
 from ema.discrepancy.extended import write_extended
 from ema.models.actuator import Actuator
 

@@ -9,9 +9,9 @@ from benchmarks import strata
 from benchmarks.strata import as_actuator
 from ema.core.names import FAULTS
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.delays import see_delays
 from ema.discrepancy.actuator.examine import examine
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.reading.delays import see_delays
 
 
 def seen(hidden, name, **flaws):

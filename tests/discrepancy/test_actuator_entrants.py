@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.entrants import weigh_sets
-from ema.discrepancy.actuator.free import K_FREE
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.search import Search, start_model
+from ema.discrepancy.actuator.fitting.candidates import candidates
+from ema.discrepancy.actuator.fitting.free import K_FREE
+from ema.discrepancy.actuator.fitting.search import Search, start_model
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.scoring.entrants import weigh_sets
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 
 
 @pytest.mark.slow

@@ -6,8 +6,8 @@ import pytest
 from trials import examine_drawn
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
+from ema.discrepancy.actuator.reading.cycles import prepare
 
 
 @pytest.mark.slow

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator import features as f
-from ema.discrepancy.actuator.controller import describe_function_of_error, fit_function_of_error, fit_gains
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.fit import residuals
-from ema.discrepancy.actuator.gear import find_resonance
-from ema.discrepancy.actuator.noise import Noise, judge
-from ema.discrepancy.actuator.plant import EmaPlant
+from ema.discrepancy.actuator.fitting.fit import residuals
+from ema.discrepancy.actuator.reading import features as f
+from ema.discrepancy.actuator.reading.controller import describe_function_of_error, fit_function_of_error, fit_gains
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.reading.gear import find_resonance
+from ema.discrepancy.actuator.simulating.noise import Noise, judge
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 from ema.models import hf
 
 

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ema.discrepancy.actuator.fit import fit
-from ema.discrepancy.actuator.free import Free
-from ema.discrepancy.actuator.noise import MotionNoise, Noise
+from ema.discrepancy.actuator.fitting.fit import fit
+from ema.discrepancy.actuator.fitting.free import Free
+from ema.discrepancy.actuator.simulating.noise import MotionNoise, Noise
 from ema.discrepancy.engine.statistic import Root
 
 N = 400  # features of a cycle

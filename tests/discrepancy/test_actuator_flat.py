@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.comparators import take_step, tell_step
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.fit import fit, residuals_at, stacked_jacobian
-from ema.discrepancy.actuator.flat import settle
-from ema.discrepancy.actuator.free import K_FREE, free
-from ema.discrepancy.actuator.gear import find_resonance, start_swinging
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
+from ema.discrepancy.actuator.fitting.comparators import take_step, tell_step
+from ema.discrepancy.actuator.fitting.fit import fit, residuals_at, stacked_jacobian
+from ema.discrepancy.actuator.fitting.flat import settle
+from ema.discrepancy.actuator.fitting.free import K_FREE, free
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.reading.gear import find_resonance, start_swinging
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 
 GAINS = {"gain_a": 0.007, "gain_b": -0.027, "gain_c": -0.014}
 CHANGE = "magnet_flux.change"

@@ -9,12 +9,12 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.actuator import examine as whole
-from ema.discrepancy.actuator import likeliest
-from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.free import K_FREE
-from ema.discrepancy.actuator.model import Model
-from ema.discrepancy.actuator.paths import Path
+from ema.discrepancy.actuator.finding.paths import Path
+from ema.discrepancy.actuator.fitting.candidates import candidates
+from ema.discrepancy.actuator.fitting.free import K_FREE
+from ema.discrepancy.actuator.fitting.model import Model
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.scoring import likeliest
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.engine.posterior import Entry
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
-from ema.discrepancy.actuator.sampling import between, positions_every
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.reading.sampling import between, positions_every
 
 
 def from_the_bus(channels):

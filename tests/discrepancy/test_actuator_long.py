@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.fit import residuals
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.thinning import thin
+from ema.discrepancy.actuator.fitting.fit import residuals
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.reading.thinning import thin
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 
 TRUTH = {"k1": 0.05, "k4": 0.04}
 

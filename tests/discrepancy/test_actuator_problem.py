@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.problem import ActuatorProblem, as_cause, cost_of
+from ema.discrepancy.actuator.fitting.candidates import candidates
+from ema.discrepancy.actuator.fitting.problem import ActuatorProblem, as_cause, cost_of
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 from ema.discrepancy.engine.records import Pool, seeds
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import split
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.repeating import describe, repeating
-from ema.discrepancy.actuator.search import Search
+from ema.discrepancy.actuator.fitting.search import Search
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
+from ema.discrepancy.actuator.telling.repeating import describe, repeating
 
 
 @pytest.mark.parametrize(

@@ -8,16 +8,16 @@ import pytest
 from benchmarks.foreign import record, truths
 from ema.core.names import FAULTS
 from ema.core.records import Record
-from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.conditions import take_recorded_conditions
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import split
-from ema.discrepancy.actuator.free import K_FREE
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.ridge import sort_by_nearness, walk_ridge
-from ema.discrepancy.actuator.screening import Screened, probe
-from ema.discrepancy.actuator.search import Search
+from ema.discrepancy.actuator.finding.ridge import sort_by_nearness, walk_ridge
+from ema.discrepancy.actuator.finding.screening import Screened, probe
+from ema.discrepancy.actuator.fitting.candidates import candidates
+from ema.discrepancy.actuator.fitting.free import K_FREE
+from ema.discrepancy.actuator.fitting.search import Search
+from ema.discrepancy.actuator.reading.conditions import take_recorded_conditions
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 
 ALONE = dict(zip(FAULTS, (0.0643, 0.1001, 0.1367, 0.1221, 0.0953, 0.0117), strict=True))  # where faults alone end
 

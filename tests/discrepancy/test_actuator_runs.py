@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import STEPS, EmaPlant
-from ema.discrepancy.actuator.runs import Asked, Memory, Runs
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import STEPS, EmaPlant
+from ema.discrepancy.actuator.simulating.runs import Asked, Memory, Runs
 
 POINTS = (
     {},

@@ -7,15 +7,15 @@ from dataclasses import replace
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import split
-from ema.discrepancy.actuator.free import K_FREE
-from ema.discrepancy.actuator.motions import motions
-from ema.discrepancy.actuator.next_recording import THE_SAME, next_recording
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.search import Model, Search
+from ema.discrepancy.actuator.fitting.candidates import candidates
+from ema.discrepancy.actuator.fitting.free import K_FREE
+from ema.discrepancy.actuator.fitting.search import Model, Search
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
+from ema.discrepancy.actuator.telling.motions import motions
+from ema.discrepancy.actuator.telling.next_recording import THE_SAME, next_recording
 
 
 @pytest.fixture(scope="module")

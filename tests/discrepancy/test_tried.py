@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from ema.core import config, resources
-from ema.discrepancy.actuator import candidates as actuator
-from ema.discrepancy.actuator import free
-from ema.discrepancy.actuator.gear import Resonance
-from ema.discrepancy.actuator.weak import ShownLine, ShownStretch
+from ema.discrepancy.actuator.fitting import candidates as actuator
+from ema.discrepancy.actuator.fitting import free
+from ema.discrepancy.actuator.reading.gear import Resonance
+from ema.discrepancy.actuator.reading.weak import ShownLine, ShownStretch
 from ema.discrepancy.axis import candidates as axis
 from ema.discrepancy.axis.plant import AxisPlant
 from ema.discrepancy.axis.screened import SCREENED

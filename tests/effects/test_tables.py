@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.discrepancy.actuator.extension import TABLES, write_extension
-from ema.discrepancy.actuator.features import Signals, features
-from ema.discrepancy.actuator.structure import structure
-from ema.discrepancy.actuator.weak import torque as weak_torque
+from ema.discrepancy.actuator.reading.features import Signals, features
+from ema.discrepancy.actuator.reading.structure import structure
+from ema.discrepancy.actuator.reading.weak import torque as weak_torque
+from ema.discrepancy.actuator.telling.extension import TABLES, write_extension
 from ema.effects import registry
 from ema.effects.table import KNOTS, tabulated
 from ema.models import hf

@@ -5,8 +5,8 @@ from __future__ import annotations
 from benchmarks import discrepancy, frozen
 from benchmarks.strata import Trial
 from benchmarks.strata import drawn as draw
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import Examination, examine
+from ema.discrepancy.actuator.reading.cycles import prepare
 
 
 def examine_drawn(stratum: str, number: int, seed: int) -> tuple[Trial, Examination]:

@@ -18,25 +18,32 @@ from ema.identification.alignment import aligned
 from ema.models import actuator_file
 from ema.models.actuator import Actuator
 
-from .clipping import describe as describe_ranges
-from .conditions import take_recorded_conditions
-from .cycles import prepare
-from .gear import find_resonance, start_swinging
-from .growing import describe, deviations, find_faults_beside, find_growing_faults
-from .likeliest import Answer, take_likeliest
-from .measured import Measured
-from .model import Model
-from .next_recording import next_recording
-from .noise import Noise, Verdict
-from .paths import Path as Way
-from .paths import begin_with_faults, begin_with_faults_alone, choose_path, go_on, resume, retry_with_steady_faults
-from .plant import EmaPlant
-from .play import add_user_friction, take_hold_of_user
-from .search import Search
-from .simpler import drop_constant_parts, drop_faults, simplify, take_resolver_zero
-from .telling import try_as_function, write_findings
-from .thinning import thin
-from .verdicts import NEARLY, settle_at_minimum
+from .finding.paths import Path as Way
+from .finding.paths import (
+    begin_with_faults,
+    begin_with_faults_alone,
+    choose_path,
+    go_on,
+    resume,
+    retry_with_steady_faults,
+)
+from .finding.simpler import drop_constant_parts, drop_faults, simplify, take_resolver_zero
+from .finding.verdicts import NEARLY, settle_at_minimum
+from .fitting.growing import describe, deviations, find_faults_beside, find_growing_faults
+from .fitting.model import Model
+from .fitting.search import Search
+from .reading.clipping import describe as describe_ranges
+from .reading.conditions import take_recorded_conditions
+from .reading.cycles import prepare
+from .reading.gear import find_resonance, start_swinging
+from .reading.measured import Measured
+from .reading.play import add_user_friction, take_hold_of_user
+from .reading.thinning import thin
+from .scoring.likeliest import Answer, take_likeliest
+from .simulating.noise import Noise, Verdict
+from .simulating.plant import EmaPlant
+from .telling.next_recording import next_recording
+from .telling.telling import try_as_function, write_findings
 
 MIN_CYCLES = 2
 N_BESIDE = 2  # turns in which faults of each cycle are found anew beside the effects
@@ -181,7 +188,7 @@ def discrepancy(
     plant_file: Path, records: Sequence[Record], say: Progress
 ) -> tuple[Findings, Callable[[], list[Picture]]]:
     """Findings on records of the actuator in `plant_file`, and what draws their pictures."""
-    from .pictures import pictures
+    from .telling.pictures import pictures
 
     plant = actuator_file.load(plant_file)
     read = [aligned(record, plant) for record in records]

@@ -9,12 +9,12 @@ import pytest
 
 from ema.core.names import CURRENTS
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.clipping import ranges
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine
-from ema.discrepancy.actuator.fit import excess_at
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
+from ema.discrepancy.actuator.fitting.fit import excess_at
+from ema.discrepancy.actuator.reading.clipping import ranges
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 
 K3 = 0.05
 

@@ -7,9 +7,11 @@ from types import SimpleNamespace
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator import comparators
-from ema.discrepancy.actuator.candidates import candidates
-from ema.discrepancy.actuator.comparators import (
+from ema.discrepancy.actuator.examine import split
+from ema.discrepancy.actuator.finding.verdicts import settle_at_minimum
+from ema.discrepancy.actuator.fitting import comparators
+from ema.discrepancy.actuator.fitting.candidates import candidates
+from ema.discrepancy.actuator.fitting.comparators import (
     TRIED,
     find_delay,
     find_step,
@@ -18,13 +20,11 @@ from ema.discrepancy.actuator.comparators import (
     tell_step,
     weigh_delay,
 )
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.examine import split
-from ema.discrepancy.actuator.free import K_FREE
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import NOISE_STEPS, STEPS, EmaPlant
-from ema.discrepancy.actuator.search import Search
-from ema.discrepancy.actuator.verdicts import settle_at_minimum
+from ema.discrepancy.actuator.fitting.free import K_FREE
+from ema.discrepancy.actuator.fitting.search import Search
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import NOISE_STEPS, STEPS, EmaPlant
 
 
 @pytest.fixture

@@ -9,11 +9,11 @@ import pytest
 
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.checks import check_rate, check_signals
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.features import Signals
-from ema.discrepancy.actuator.measured import Measured
-from ema.discrepancy.actuator.timing import find_samples_late
+from ema.discrepancy.actuator.fitting.timing import find_samples_late
+from ema.discrepancy.actuator.reading.checks import check_rate, check_signals
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.reading.features import Signals
+from ema.discrepancy.actuator.reading.measured import Measured
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from ema.discrepancy.actuator import faint
-from ema.discrepancy.actuator.model import Model
+from ema.discrepancy.actuator.fitting.model import Model
+from ema.discrepancy.actuator.scoring import faint
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.engine.posterior import Entry
 

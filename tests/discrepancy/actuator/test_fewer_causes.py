@@ -6,10 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ema.discrepancy.actuator.candidates import Candidate
-from ema.discrepancy.actuator.free import K_FREE, free
-from ema.discrepancy.actuator.model import Model
-from ema.discrepancy.actuator.simpler import (
+from ema.discrepancy.actuator.finding.simpler import (
     drop_common_faults,
     drop_constant_parts,
     drop_faults,
@@ -17,6 +14,9 @@ from ema.discrepancy.actuator.simpler import (
     simplify,
     take_resolver_zero,
 )
+from ema.discrepancy.actuator.fitting.candidates import Candidate
+from ema.discrepancy.actuator.fitting.free import K_FREE, free
+from ema.discrepancy.actuator.fitting.model import Model
 
 NOISE, NO_NOISE = SimpleNamespace(is_noise=True, p_value=0.5), SimpleNamespace(is_noise=False, p_value=1e-6)
 

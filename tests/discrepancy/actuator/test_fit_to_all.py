@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ema.discrepancy.actuator.entrants import _fit_to_all
+from ema.discrepancy.actuator.scoring.entrants import _fit_to_all
 
 
 def fitted(by, *names, misfit=1.0, cycles=(0, 1)):

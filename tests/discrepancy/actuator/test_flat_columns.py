@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ema.discrepancy.actuator.fit import stacked_jacobian
-from ema.discrepancy.actuator.flat import N_SEEDS, _as_columns, _learn, _system
-from ema.discrepancy.actuator.free import free
-from ema.discrepancy.actuator.noise import MotionNoise
+from ema.discrepancy.actuator.fitting.fit import stacked_jacobian
+from ema.discrepancy.actuator.fitting.flat import N_SEEDS, _as_columns, _learn, _system
+from ema.discrepancy.actuator.fitting.free import free
+from ema.discrepancy.actuator.simulating.noise import MotionNoise
 from ema.discrepancy.engine.statistic import Root
 
 

@@ -11,8 +11,8 @@ import pytest
 
 from ema.core import config, resources
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import prepare
-from ema.discrepancy.actuator.gear import find_resonance
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.reading.gear import find_resonance
 from ema.models.actuator import Actuator
 
 COMPLIANCE, INERTIA, DAMPER = 3e-5, 0.6, 30.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.discrepancy.actuator.held import held_user, pressed_user
+from ema.discrepancy.actuator.reading.held import held_user, pressed_user
 
 B = 0.1
 SHAFT = np.concatenate([np.linspace(0.0, 1.0, 101), np.linspace(1.0, 0.0, 101)])

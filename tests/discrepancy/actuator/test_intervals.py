@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ema.core.names import FAULTS
-from ema.discrepancy.actuator import intervals
+from ema.discrepancy.actuator.telling import intervals
 
 FREE = [SimpleNamespace(name=name) for name in FAULTS]
 SCORE, FITTED = 1e-4, 5e-3

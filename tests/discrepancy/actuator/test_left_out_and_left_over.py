@@ -7,13 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ema.discrepancy.actuator import remains as module
-from ema.discrepancy.actuator.free import Free
-from ema.discrepancy.actuator.leave_out import over_folds, settled, square
-from ema.discrepancy.actuator.model import N_FINAL, Model
-from ema.discrepancy.actuator.plant import ENVELOPE_STEP
-from ema.discrepancy.actuator.remains import remains
-from ema.discrepancy.actuator.runs import Runs
+from ema.discrepancy.actuator.fitting.free import Free
+from ema.discrepancy.actuator.fitting.leave_out import over_folds, settled, square
+from ema.discrepancy.actuator.fitting.model import N_FINAL, Model
+from ema.discrepancy.actuator.simulating.plant import ENVELOPE_STEP
+from ema.discrepancy.actuator.simulating.runs import Runs
+from ema.discrepancy.actuator.telling import remains as module
+from ema.discrepancy.actuator.telling.remains import remains
 from ema.discrepancy.folds import Folds
 
 N, N_CYCLES, N_ENVELOPE = 60, 5, 400

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ema.discrepancy.actuator import forward
+from ema.discrepancy.actuator.finding import forward
 
 LEFT = 700.0
 

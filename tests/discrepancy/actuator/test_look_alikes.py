@@ -10,14 +10,14 @@ import pytest
 from benchmarks import strata
 from ema.core.names import FAULTS
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.candidates import Line, candidates
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import split
-from ema.discrepancy.actuator.free import K_FREE
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.screening import find_look_alikes, rank_to_first_order
-from ema.discrepancy.actuator.search import Search
+from ema.discrepancy.actuator.finding.screening import find_look_alikes, rank_to_first_order
+from ema.discrepancy.actuator.fitting.candidates import Line, candidates
+from ema.discrepancy.actuator.fitting.free import K_FREE
+from ema.discrepancy.actuator.fitting.search import Search
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 
 
 @pytest.mark.further

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from ema.discrepancy.actuator.candidates import Candidate
-from ema.discrepancy.actuator.fit import Fit
-from ema.discrepancy.actuator.free import K_FREE, free
-from ema.discrepancy.actuator.model import Model, free_again, strip
-from ema.discrepancy.actuator.weighing import is_alike, is_credible, is_enough
+from ema.discrepancy.actuator.finding.weighing import is_alike, is_credible, is_enough
+from ema.discrepancy.actuator.fitting.candidates import Candidate
+from ema.discrepancy.actuator.fitting.fit import Fit
+from ema.discrepancy.actuator.fitting.free import K_FREE, free
+from ema.discrepancy.actuator.fitting.model import Model, free_again, strip
 
 
 def candidate(name: str) -> Candidate:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ema.discrepancy.actuator import paths
+from ema.discrepancy.actuator.finding import paths
 
 
 def answer(name, is_noise):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.discrepancy.actuator.resolution import resolution
+from ema.discrepancy.actuator.reading.resolution import resolution
 
 COURSE = 0.3 * np.sin(np.linspace(0.0, 20.0, 3000))
 

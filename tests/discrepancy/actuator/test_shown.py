@@ -9,12 +9,12 @@ from benchmarks import strata
 from benchmarks.strata import as_actuator
 from ema.core.names import FAULTS
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import examine, split
-from ema.discrepancy.actuator.noise import Noise
-from ema.discrepancy.actuator.plant import EmaPlant
-from ema.discrepancy.actuator.screening import rank_to_first_order
-from ema.discrepancy.actuator.search import Search, start_model
+from ema.discrepancy.actuator.finding.screening import rank_to_first_order
+from ema.discrepancy.actuator.fitting.search import Search, start_model
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.simulating.noise import Noise
+from ema.discrepancy.actuator.simulating.plant import EmaPlant
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ema.discrepancy.actuator.supply import DOUBT, LIKE, resolve
+from ema.discrepancy.actuator.reading.supply import DOUBT, LIKE, resolve
 
 AT = [slice(2, 50)]
 

@@ -9,7 +9,7 @@ import pytest
 from trials import examine_drawn
 
 from ema.discrepancy.actuator.examine import shows_held_out_only
-from ema.discrepancy.actuator.model import Model
+from ema.discrepancy.actuator.fitting.model import Model
 
 SEED = 1586679763  # a filter of the currents with its corner 1.3 times as high, on the light actuator; k2, k5
 

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ema.discrepancy.actuator.fit import columns, step_to
-from ema.discrepancy.actuator.free import free
-from ema.discrepancy.actuator.valley import pairs
+from ema.discrepancy.actuator.fitting.fit import columns, step_to
+from ema.discrepancy.actuator.fitting.free import free
+from ema.discrepancy.actuator.fitting.valley import pairs
 from ema.effects import registry
 from ema.effects.base import Effect
 

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.actuator import telling
-from ema.discrepancy.actuator.cycles import prepare
 from ema.discrepancy.actuator.examine import Examination
-from ema.discrepancy.actuator.features import features, slices
-from ema.discrepancy.actuator.model import Model
-from ema.discrepancy.actuator.noise import Verdict
-from ema.discrepancy.actuator.pictures import pictures
-from ema.discrepancy.actuator.plant import ENVELOPE_STEP
-from ema.discrepancy.actuator.runs import Runs
+from ema.discrepancy.actuator.fitting.model import Model
+from ema.discrepancy.actuator.reading.cycles import prepare
+from ema.discrepancy.actuator.reading.features import features, slices
+from ema.discrepancy.actuator.scoring import entrants
+from ema.discrepancy.actuator.simulating.noise import Verdict
+from ema.discrepancy.actuator.simulating.plant import ENVELOPE_STEP
+from ema.discrepancy.actuator.simulating.runs import Runs
+from ema.discrepancy.actuator.telling import telling
+from ema.discrepancy.actuator.telling.pictures import pictures
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.engine.posterior import Entry
 
@@ -40,9 +41,9 @@ def posterior(**p):
 def test_a_rival_is_as_likely_as_the_set_with_it_in_the_effects_place():
     outcome = posterior(viscous_drag__inertia=0.6, cogging__inertia=0.3, inertia=0.1)
     answer = named("viscous_drag", "inertia")
-    p = telling.probabilities(outcome, answer, "viscous_drag", "cogging", "k1 and k2 alike")
+    p = entrants.probabilities(outcome, answer, "viscous_drag", "cogging", "k1 and k2 alike")
     assert p == pytest.approx([0.6, 0.3, 0.1])  # faults in its place: the set without it
-    assert telling.probabilities(outcome, answer, "inertia") == pytest.approx([1.0])
+    assert entrants.probabilities(outcome, answer, "inertia") == pytest.approx([1.0])
 
 
 @pytest.mark.parametrize(
