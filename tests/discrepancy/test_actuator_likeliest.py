@@ -114,7 +114,7 @@ def test_what_was_heard_is_never_weighed_by_its_first_fit_again(monkeypatch):
         return outcome, [answer]
 
     for name, does in {
-        "fit_faint_effects": lambda search, m: [first, other] if m is nothing else [beside],
+        "fit_faint_effects": lambda search, m, n: [first, other] if m is nothing else [beside],
         "weigh_sets": weigh_sets,
         "hear": lambda outcome, models, found: (first, ()) if found is nothing else None,
         "_go_on_from_heard": lambda *of: likeliest.Answer(settled, noise, [()]),

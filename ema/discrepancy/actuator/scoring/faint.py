@@ -21,8 +21,8 @@ from ema.discrepancy.grade import IN_SET
 if TYPE_CHECKING:
     from ema.discrepancy.actuator.fitting.search import Search
 
-N_FITTED = 6  # likeliest effects that are fitted; of one that may act in two ways, both
-N_RIVALS = 3  # the same in the place of what was found
+N_FITTED = 6  # likeliest effects that are fitted beside nothing; of one that may act in two ways, both
+N_RIVALS = 3  # the same beside or in the place of what was found
 SURE = 0.95  # probability that something is there, from which a record that leaves about noise is not adequate
 LEAST = float(np.log(SURE / (1.0 - SURE)))  # [nats] that an effect must promise, else it cannot make sure
 
@@ -40,7 +40,7 @@ def fit_rivals(search: Search, answer: Model, weighed: Sequence[Model]) -> list[
 
 
 def fit_faint_effects(
-    search: Search, model: Model, n: int = N_FITTED, least: float = LEAST, known: Container[frozenset[Way]] = ()
+    search: Search, model: Model, n: int, least: float = LEAST, known: Container[frozenset[Way]] = ()
 ) -> list[Model]:
     """`model` with one effect each that promises, to first order, `least` nats beyond its cost; the likeliest `n`.
 

@@ -17,7 +17,7 @@ from ema.discrepancy.grade import IN_SET, NAMED
 from ema.effects import registry
 
 from .entrants import probabilities, weigh_sets
-from .faint import fit_faint_effects, fit_rivals, hear, may_hide_something
+from .faint import N_FITTED, N_RIVALS, fit_faint_effects, fit_rivals, hear, may_hide_something
 
 if TYPE_CHECKING:
     from ema.discrepancy.actuator.finding.paths import Path
@@ -85,7 +85,8 @@ def take_likeliest(search: Search, path: Path, found: Answer) -> tuple[Outcome, 
     """
     others: list[Model] = []
     while True:
-        faint = fit_faint_effects(search, found.model) if may_hide_something(found.model, found.verdict) else []
+        n = N_RIVALS if found.model.effects else N_FITTED
+        faint = fit_faint_effects(search, found.model, n) if may_hide_something(found.model, found.verdict) else []
         others = [m for m in others if not set(m.names) <= set(found.model.names)]  # first fits, not at the minimum
         others += faint
         outcome, models = weigh_sets(search, path.before, found.model, others)
