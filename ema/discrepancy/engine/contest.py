@@ -221,13 +221,17 @@ class Contest:
                 break
             (moved,) = self.weigh([replace(w.entrant, point={**w.entrant.point, **w.point})])
             self.say(f"{w.name}, simulated anew: {moved.log_evidence - w.log_evidence:+.1f} nats")
-            seen = self._agreeing([*seen, replace(moved, columns=w.columns)])
+            seen = self._agreeing([*seen, self._integrated(moved.entrant, moved.predictions, w.columns)])
         return seen
 
     def _agreeing(self, seen: Sequence[Weighed]) -> list[Weighed]:
         points = np.array([w.at for w in seen])
         means = np.array([[w.predictions[half].mean for w in seen] for half in (1, 2)])
-        return [self._integrated(w.entrant, w.predictions, learn_from(w.columns, points, means)) for w in seen]
+        learned = [learn_from(w.columns, points, means) for w in seen]
+        return [
+            w if np.array_equal(J, w.columns) else self._integrated(w.entrant, w.predictions, J)
+            for w, J in zip(seen, learned, strict=True)
+        ]
 
 
 def average(found: Sequence[Weighed]) -> Weighed:

@@ -32,14 +32,14 @@ def learn_from(columns: Array, points: Array, means: Array) -> Array:
     length = np.linalg.norm(columns, axis=0)
     scale = np.where(length == 0.0, 1.0, length)
     along, spread, ways = np.linalg.svd((points - points.mean(axis=0)) * scale, full_matrices=False)
-    J = columns / scale
+    J, change = columns / scale, np.zeros_like(columns)
     for u, s, way in zip(along.T, spread, ways, strict=True):
         if s <= APART * spread[0]:
             break
         first, second = u @ (means - means.mean(axis=1, keepdims=True))
-        told, of_noise, said = 0.5 * (first + second), 0.5 * (first - second), s * (J @ way)
+        told, of_noise, said = 0.5 * (first + second), 0.5 * (first - second), s * ((J + change) @ way)
         if (told - said) @ (told - said) <= (of_noise @ of_noise) * float(f.isf(CHANCE, d, d)):
             continue
         response = float(np.clip(first @ second / (told @ told), 0.0, 1.0))  # the rest of its length is noise
-        J = J + np.outer(response * told - said, way) / s
-    return np.asarray(J * scale)
+        change += np.outer(response * told - said, way) / s
+    return np.asarray(columns + change * scale)

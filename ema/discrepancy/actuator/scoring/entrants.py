@@ -115,12 +115,12 @@ def _fit_to_all(search: Search, answer: Model) -> list[Model]:
     for m in search.tried:
         key = frozenset(m.names)
         if len(m.fit.residuals) == search.plant.data.n_cycles:
-            done[key] = m
+            if m.by is search.noise:
+                done[key] = m
         elif m.fit.misfit < min(within_reach(answer), best[key].fit.misfit if key in best else np.inf):
             best[key] = m
             done.pop(key, None)  # of a worse start
-    known = {key: m for key, m in done.items() if m.by is search.noise}
-    return [known[key] if key in known else search.fitted_to_all(m) for key, m in best.items()]
+    return [done.get(key) or search.fitted_to_all(m) for key, m in best.items()]
 
 
 def _choose_standing(search: Search, first: list[Model]) -> list[Model]:
