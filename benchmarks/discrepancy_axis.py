@@ -20,8 +20,8 @@ import numpy as np
 from scipy import stats
 
 from ema.core.version import version
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 CONFIDENT = 0.9

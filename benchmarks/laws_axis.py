@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks import resumed
 from ema.core.version import version
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 SURE = 0.9

@@ -22,9 +22,9 @@ from scipy import stats
 from benchmarks import resumed
 from ema.core.records import Record
 from ema.core.version import version
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.wording import findings
+from ema.discrepancy.axis.examine import findings
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import LinearAxis, RotaryAxis
 
 SURE = 0.9  # confidence from which a name wakes somebody

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ema.discrepancy.findings import Findings
 
 # Which module examines which kind of plant.
-EXAMINERS = {"ema": "ema.discrepancy.actuator.examine", "axis": "ema.discrepancy.axis.wording"}
+EXAMINERS = {"ema": "ema.discrepancy.actuator.examine", "axis": "ema.discrepancy.axis.examine"}
 N_LEADING = 3  # sets that are told
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from ema.core import resources
 from ema.core.records import Record
-from ema.discrepancy.axis import stamps
+from ema.discrepancy.axis.reading import stamps
 from ema.discrepancy.records import begin
 
 

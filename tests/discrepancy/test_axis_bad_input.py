@@ -7,7 +7,7 @@ import pytest
 
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 PLANT = RotaryAxis(J=5e-5, F_d=0.02, k_t=0.05)

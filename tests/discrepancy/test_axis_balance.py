@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.balance.of_records import balance
-from ema.discrepancy.axis.balance.smooth import bumps_at, local_polynomial
-from ema.discrepancy.axis.balance.telling import describe, sentences
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.wording import findings
+from ema.discrepancy.axis.balance.records.of_records import balance
+from ema.discrepancy.axis.balance.telling.telling import describe, sentences
+from ema.discrepancy.axis.examine import findings
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.reading.smooth import bumps_at, local_polynomial
 from ema.models.axis_config import LinearAxis, RotaryAxis
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.agreeing import merge
-from ema.discrepancy.axis.beside import balance_beside
-from ema.discrepancy.axis.named_laws import find_missing, name_laws
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.judging.agreeing import merge
+from ema.discrepancy.axis.judging.beside import balance_beside
+from ema.discrepancy.axis.judging.named_laws import find_missing, name_laws
 from ema.discrepancy.findings import FoundEffect
 from ema.models.axis_config import RotaryAxis
 

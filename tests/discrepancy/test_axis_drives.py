@@ -9,14 +9,14 @@ import pytest
 
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.balance.course import courses
-from ema.discrepancy.axis.balance.integrated import integrate_rows
-from ema.discrepancy.axis.balance.laws import laws
-from ema.discrepancy.axis.balance.of_records import shown_by
-from ema.discrepancy.axis.balance.telling import describe
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.closed_loop import closed_loop
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.balance.laws.laws import laws
+from ema.discrepancy.axis.balance.records.course import courses
+from ema.discrepancy.axis.balance.records.integrated import integrate_rows
+from ema.discrepancy.axis.balance.records.of_records import shown_by
+from ema.discrepancy.axis.balance.telling.telling import describe
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.simulating.closed_loop import closed_loop
 from ema.models.axis_config import LinearAxis, RotaryAxis
 
 

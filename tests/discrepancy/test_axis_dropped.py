@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis import candidates
-from ema.discrepancy.axis.dropped import list_dropped
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding import candidates
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.telling.dropped import list_dropped
 from ema.discrepancy.folds import Folds
 from ema.discrepancy.grade import Left
 from ema.discrepancy.outcome import Outcome

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
-from ema.discrepancy.axis.external import add_external
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.judging.external import add_external
 from ema.discrepancy.extended import write_extended
 from ema.discrepancy.findings import FoundEffect, Quantity
 from ema.models.axis_config import RotaryAxis

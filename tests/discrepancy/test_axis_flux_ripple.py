@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from benchmarks import strata_axis
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.wording import findings
+from ema.discrepancy.axis.examine import findings
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.balance.as_effects import point
-from ema.discrepancy.axis.balance.laws import laws
-from ema.discrepancy.axis.balance.of_records import balance
-from ema.discrepancy.axis.balance.telling import describe
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.screened import begin_at
+from ema.discrepancy.axis.balance.laws.laws import laws
+from ema.discrepancy.axis.balance.records.of_records import balance
+from ema.discrepancy.axis.balance.telling.as_effects import point
+from ema.discrepancy.axis.balance.telling.telling import describe
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.finding.screened import begin_at
 from ema.discrepancy.fitting import fit
 from ema.discrepancy.plant import Candidate, Free
 from ema.models.axis_config import RotaryAxis

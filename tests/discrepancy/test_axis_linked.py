@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from ema.discrepancy.axis.balance.telling import describe
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.ruling import rule_by_balance
+from ema.discrepancy.axis.balance.telling.telling import describe
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.judging.ruling import rule_by_balance
 from ema.models.axis_config import RotaryAxis
 
 WIDE = 1.5  # half intervals of 95 %: nine numbers are asked for

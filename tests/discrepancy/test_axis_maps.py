@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis import balance_pictures
-from ema.discrepancy.axis.balance.course import courses
-from ema.discrepancy.axis.balance.own_zeros import add_zeros
-from ema.discrepancy.axis.balance.telling import describe
-from ema.discrepancy.axis.external import add_external
-from ema.discrepancy.axis.measured import Zero
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.balance.records.course import courses
+from ema.discrepancy.axis.balance.records.own_zeros import add_zeros
+from ema.discrepancy.axis.balance.telling.telling import describe
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.judging.external import add_external
+from ema.discrepancy.axis.reading.measured import Zero
+from ema.discrepancy.axis.telling import balance_pictures
 from ema.models.axis_config import RotaryAxis
 
 
@@ -79,6 +79,6 @@ def test_pictures_show_what_the_laws_take_of_the_residual(maps, bench, monkeypat
 
 def test_a_zero_that_rests_on_a_wrong_plant_file_is_found_by_the_balance(maps, bench, monkeypatch):
     """What dry friction of the plant file leaves may move a line; free runs begin from the better zero."""
-    monkeypatch.setattr("ema.discrepancy.axis.plant.zeros", lambda _: {"record 2": Zero(-0.0082, (36.0, 72.0))})
+    monkeypatch.setattr("ema.discrepancy.axis.finding.plant.zeros", lambda _: {"record 2": Zero(-0.0082, (36.0, 72.0))})
     plant = bench(maps.record(maps.OWN, 1), maps.record(maps.OWN, 2))
     assert plant.zeros["record 2"].angle == 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema.discrepancy.axis.next_records import next_records
+from ema.discrepancy.axis.telling.next_records import next_records
 
 SURE = {"value": 2.0, "low": 1.9, "high": 2.1, "unit": "", "plant_file": 2.0}
 UNSURE = {**SURE, "low": -0.1}

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.weak_form import weak_form
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.scanning.weak_form import weak_form
 from ema.models.axis_config import LinearAxis, RotaryAxis
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.plausible import electrical, find_implausible
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.telling.plausible import electrical, find_implausible
 from ema.models.axis_config import RotaryAxis
 
 MOTOR = {"kind": "axis", "drive": "current", "J": 5e-5, "F_d": 0.02, "k_t": 0.05, "k_e": 0.0333, "R": 0.5, "L": 3e-4}

@@ -11,8 +11,8 @@ import pytest
 
 from ema.core import resources
 from ema.core.records import read_record
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models import axis_config
 
 DATA = Path(__file__).parents[1] / "data" / "laas_mn4004"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.ripple import describe, find_ripples, structure
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.reading.ripple import describe, find_ripples, structure
 from ema.models.axis_config import RotaryAxis
 
 SPEED, NOISE = 28.4, 0.1

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.between import Rereading, examine_ways
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.between import Rereading, examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.discrepancy.fitting import fit
 from ema.discrepancy.plant import Fitted
 from ema.discrepancy.progress import Progress

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle
-from ema.discrepancy.axis.stamps import describe, examine_stamps
+from ema.discrepancy.axis.reading.stamps import describe, examine_stamps
 
 PERIOD, N = 1e-3, 4000
 

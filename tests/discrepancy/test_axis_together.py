@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis.balance.agreement import _compare
-from ema.discrepancy.axis.balance.telling import describe, sentences
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.balance.regressing.agreement import _compare
+from ema.discrepancy.axis.balance.telling.telling import describe, sentences
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import LinearAxis, RotaryAxis
 
 SLOW = {"motions": ((2, 0.3, 0), (1, 0.15, 1.5), (4, 0.4, -2)), "duration": 4.0, "period": 2e-3}

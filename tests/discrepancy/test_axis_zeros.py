@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from ema.discrepancy.axis.overlap import between
+from ema.discrepancy.axis.scanning.overlap import between
 
 OWN = {36.0: 8e-3 * cmath.exp(0.4j), 72.0: 2.5e-3 * cmath.exp(-1.1j)}
 NEIGHBOUR = {14.0: 3e-3 * cmath.exp(0.9j), 28.0: 1.2e-3 * cmath.exp(-0.2j)}

@@ -13,9 +13,9 @@ from ema.discrepancy.actuator.fitting import candidates as actuator
 from ema.discrepancy.actuator.fitting import free
 from ema.discrepancy.actuator.reading.gear import Resonance
 from ema.discrepancy.actuator.reading.weak import ShownLine, ShownStretch
-from ema.discrepancy.axis import candidates as axis
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.screened import SCREENED
+from ema.discrepancy.axis.finding import candidates as axis
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.finding.screened import SCREENED
 from ema.effects import registry
 from ema.effects.search import Look
 from ema.models.actuator import Actuator

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from ema.discrepancy.axis.balance.law import Acting
-from ema.discrepancy.axis.balance.motion import Motion
-from ema.discrepancy.axis.balance.regression import Plain
-from ema.discrepancy.axis.balance.rows import Rows
+from ema.discrepancy.axis.balance.laws.law import Acting
+from ema.discrepancy.axis.balance.laws.motion import Motion
+from ema.discrepancy.axis.balance.regressing.regression import Plain
+from ema.discrepancy.axis.balance.regressing.rows import Rows
 
 J, F_D, C = 2e-3, 0.05, 4e-3
 PLAIN = Plain(J, F_D, C)

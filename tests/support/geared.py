@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 FINE = 50

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 Array = NDArray[np.float64]

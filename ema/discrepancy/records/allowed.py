@@ -8,7 +8,7 @@ import numpy as np
 
 from ema.core.names import CHANNELS, CURRENTS
 from ema.core.records import Record
-from ema.discrepancy.axis.channels import LOAD_CHANNEL
+from ema.discrepancy.axis.reading.channels import LOAD_CHANNEL
 
 from .agreements import Agreement
 from .facts import FALLEN, ChannelFacts, Sampling

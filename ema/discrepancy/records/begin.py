@@ -13,7 +13,7 @@ import numpy as np
 from ema.core.errors import RecordError
 from ema.core.names import CHANNELS, CURRENTS
 from ema.core.records import Array, Cycle, Record
-from ema.discrepancy.axis.channels import LOAD_CHANNEL, known_load
+from ema.discrepancy.axis.reading.channels import LOAD_CHANNEL, known_load
 
 from .agreements import agreements, derivative, smooth
 from .first_fit import FirstFit, first_fit

@@ -8,8 +8,8 @@ import numpy as np
 
 from ema.core.names import CHANNELS
 from ema.core.records import Array, Record
-from ema.discrepancy.axis.channels import find_runs, is_cut_off
-from ema.discrepancy.axis.noise import estimate, quantum
+from ema.discrepancy.axis.reading.channels import find_runs, is_cut_off
+from ema.discrepancy.axis.reading.noise import estimate, quantum
 
 LONG = 1.5  # a step of time longer than so many median steps is a gap
 HELD = 3  # samples in a row at a channel's end from which it is held there

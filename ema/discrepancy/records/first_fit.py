@@ -18,8 +18,8 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import block_diag
 
 from ema.core.records import Array, Cycle, Record
-from ema.discrepancy.axis.cogging import integer_orders, scan
-from ema.discrepancy.axis.weak_form import Motion, Weak
+from ema.discrepancy.axis.scanning.cogging import integer_orders, scan
+from ema.discrepancy.axis.scanning.weak_form import Motion, Weak
 
 from .agreements import OVER, derivative, smooth
 

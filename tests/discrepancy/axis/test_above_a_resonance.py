@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 

@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 from balance_on_paper import F_D, PLAIN, C, J, N, acting, motion, rows
 
-from ema.discrepancy.axis.balance.along import LINES
-from ema.discrepancy.axis.balance.apart import apart, by_record
-from ema.discrepancy.axis.balance.choice import choose_laws
-from ema.discrepancy.axis.balance.course import Course
-from ema.discrepancy.axis.balance.drifting import drift_laws
-from ema.discrepancy.axis.balance.found import Balance
-from ema.discrepancy.axis.balance.law import BY_RECORD, Law, one
-from ema.discrepancy.axis.balance.laws import laws
-from ema.discrepancy.axis.balance.links import links
-from ema.discrepancy.axis.balance.memory import memory_laws
-from ema.discrepancy.axis.balance.regression import regress
-from ema.discrepancy.axis.balance.sampled import join
-from ema.discrepancy.axis.balance.units import LINEAR, ROTARY, of_base
-from ema.discrepancy.axis.balance.widths import half_widths
+from ema.discrepancy.axis.balance.laws.along import LINES
+from ema.discrepancy.axis.balance.laws.drifting import drift_laws
+from ema.discrepancy.axis.balance.laws.law import BY_RECORD, Law, one
+from ema.discrepancy.axis.balance.laws.laws import laws
+from ema.discrepancy.axis.balance.laws.links import links
+from ema.discrepancy.axis.balance.laws.memory import memory_laws
+from ema.discrepancy.axis.balance.laws.units import LINEAR, ROTARY, of_base
+from ema.discrepancy.axis.balance.records.course import Course
+from ema.discrepancy.axis.balance.records.sampled import join
+from ema.discrepancy.axis.balance.records.widths import half_widths
+from ema.discrepancy.axis.balance.regressing.apart import apart, by_record
+from ema.discrepancy.axis.balance.regressing.choice import choose_laws
+from ema.discrepancy.axis.balance.regressing.found import Balance
+from ema.discrepancy.axis.balance.regressing.regression import regress
 
 
 @pytest.mark.parametrize("linear", [False, True])

@@ -8,8 +8,8 @@ from __future__ import annotations
 import bristled
 import pytest
 
-from ema.discrepancy.axis import candidates
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding import candidates
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.discrepancy.fitting import fit
 from ema.models.axis_config import RotaryAxis
 

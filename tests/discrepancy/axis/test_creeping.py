@@ -6,7 +6,7 @@ import numpy as np
 import on_paper
 import pytest
 
-from ema.discrepancy.axis.balance.creeping import chosen, slides
+from ema.discrepancy.axis.balance.regressing.creeping import chosen, slides
 
 GRAVITY, CREEP = 0.006, 0.1  # [N m]; [rad/s]
 

@@ -8,8 +8,8 @@ import geared
 import pytest
 
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 SMALL = geared.Axis(J=1.1e-5, F=7e-3, C=4.7e-6, k_t=0.0125)

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis.balance.form import of_others
-from ema.discrepancy.axis.balance.regression import Regression
+from ema.discrepancy.axis.balance.regressing.form import of_others
+from ema.discrepancy.axis.balance.regressing.regression import Regression
 from ema.discrepancy.form import FORM
 
 POWER, LEFT, NOISE = 100.0, 3.0, 1.0

@@ -9,8 +9,8 @@ import on_paper
 import pytest
 
 from ema.core.records import Cycle
-from ema.discrepancy.axis.gear import DAMPING, gear_candidate
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.gear import DAMPING, gear_candidate
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.discrepancy.fitting import fit
 from ema.models.axis_config import RotaryAxis
 

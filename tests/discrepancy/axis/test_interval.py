@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis.interval import interval
+from ema.discrepancy.axis.naming.interval import interval
 
 
 def test_an_interval_is_as_wide_as_what_was_drawn():

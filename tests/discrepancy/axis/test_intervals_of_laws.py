@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis.balance.found import draw, draw_law
-from ema.discrepancy.axis.balance.law import Law, one
+from ema.discrepancy.axis.balance.laws.law import Law, one
+from ema.discrepancy.axis.balance.regressing.found import draw, draw_law
 
 
 def fit(inertia):

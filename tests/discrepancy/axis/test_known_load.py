@@ -9,9 +9,9 @@ import pytest
 
 from ema.core.errors import RecordError
 from ema.core.records import Record
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.intake import take_in
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.reading.intake import take_in
 from ema.models.axis_config import RotaryAxis
 
 SHARE = 0.15  # of the load, that friction takes more

@@ -7,7 +7,7 @@ import on_paper
 import pytest
 
 from ema.core.records import Cycle
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 SWING = on_paper.Swing(((2.5, 2.3, 0.3), (0.04, 80.0, 1.1)))  # a jerk that no constant acceleration follows

@@ -7,10 +7,10 @@ import pytest
 
 from benchmarks import strata_axis
 from ema.core.records import Cycle
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.lateness import see_delays
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.wording import findings
+from ema.discrepancy.axis.examine import findings
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.reading.lateness import see_delays
 from ema.models.axis_config import RotaryAxis
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import yaml
 
-from ema.discrepancy.axis import wording
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.named_laws import name_laws
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.examine import findings
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.judging.named_laws import name_laws
 from ema.discrepancy.extended import write_extended
 from ema.effects import registry
 from ema.models import axis_config
@@ -27,7 +27,7 @@ def positioner(support) -> ModuleType:
 
 def examined(positioner, bench, seed):
     plant = AxisPlant(LinearAxis.model_validate(positioner.table_plant(bench)), [positioner.table(bench, seed)])
-    return wording.findings(plant, examine_ways(plant))
+    return findings(plant, examine_ways(plant))
 
 
 def test_the_magnets_of_a_linear_motor_are_named_with_their_pitch(positioner, tmp_path):

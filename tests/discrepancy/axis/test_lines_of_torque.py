@@ -6,10 +6,10 @@ import numpy as np
 import on_paper
 import pytest
 
-from ema.discrepancy.axis.cogging import cogging_candidate
-from ema.discrepancy.axis.naming import line, torque_line
-from ema.discrepancy.axis.predictable import LONGEST_WINDOW, N_GROWTHS, predictable_time
-from ema.discrepancy.axis.zeros import zeros
+from ema.discrepancy.axis.naming.naming import line, torque_line
+from ema.discrepancy.axis.scanning.cogging import cogging_candidate
+from ema.discrepancy.axis.scanning.zeros import zeros
+from ema.discrepancy.axis.simulating.predictable import LONGEST_WINDOW, N_GROWTHS, predictable_time
 
 SIZE, ORDER, PHASE = 0.01, 12, 0.7
 AT = {"F_d": on_paper.F_D}

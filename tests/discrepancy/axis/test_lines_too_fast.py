@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis.balance.course import courses
-from ema.discrepancy.axis.balance.integrated import integrate_rows
-from ema.discrepancy.axis.balance.law import Acting
-from ema.discrepancy.axis.balance.laws import laws
-from ema.discrepancy.axis.balance.motion import Motion
-from ema.discrepancy.axis.balance.of_records import every_law, shown_by
-from ema.discrepancy.axis.balance.widths import half_widths
+from ema.discrepancy.axis.balance.laws.law import Acting
+from ema.discrepancy.axis.balance.laws.laws import laws
+from ema.discrepancy.axis.balance.laws.motion import Motion
+from ema.discrepancy.axis.balance.records.course import courses
+from ema.discrepancy.axis.balance.records.integrated import integrate_rows
+from ema.discrepancy.axis.balance.records.of_records import every_law, shown_by
+from ema.discrepancy.axis.balance.records.widths import half_widths
 
 PERIOD = 1e-3
 SPEED = 50.0  # [rad/s]: order 72 passes at 573 Hz, order 12 at 95

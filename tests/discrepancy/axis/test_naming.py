@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis.linear import by_drive, in_metres, of_axis
-from ema.discrepancy.axis.naming import line, numbers_of, torque_line
+from ema.discrepancy.axis.naming.linear import by_drive, in_metres, of_axis
+from ema.discrepancy.axis.naming.naming import line, numbers_of, torque_line
 from ema.effects import registry
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from balance_on_paper import PLAIN, motion, rows
 
-from ema.discrepancy.axis.balance.choice import _is_ruled_out
-from ema.discrepancy.axis.balance.law import BY_RECORD, Law, one
-from ema.discrepancy.axis.balance.needed import ALARM, Asked, chance, families_held, is_needed
-from ema.discrepancy.axis.balance.regression import regress
+from ema.discrepancy.axis.balance.laws.law import BY_RECORD, Law, one
+from ema.discrepancy.axis.balance.regressing.choice import _is_ruled_out
+from ema.discrepancy.axis.balance.regressing.needed import ALARM, Asked, chance, families_held, is_needed
+from ema.discrepancy.axis.balance.regressing.regression import regress
 
 M = motion()
 NOISE = 0.01

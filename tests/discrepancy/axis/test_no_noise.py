@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ema.core.records import Cycle
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.noise import estimate
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.reading.noise import estimate
 from ema.discrepancy.verdict import BOUND, judge
 from ema.models.axis_config import RotaryAxis
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis.balance.as_effects import effects
-from ema.discrepancy.axis.balance.telling import describe
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.balance.telling.as_effects import effects
+from ema.discrepancy.axis.balance.telling.telling import describe
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models import axis
 from ema.models.axis_config import RotaryAxis
 

@@ -6,10 +6,10 @@ import numpy as np
 import on_paper
 import pytest
 
-from ema.discrepancy.axis.local_polynomials import left_of_noise, smooth
-from ema.discrepancy.axis.noise import Noise
-from ema.discrepancy.axis.pushed import pushed
-from ema.discrepancy.axis.quiet_drive import DEGREE, WIDTHS, quieten
+from ema.discrepancy.axis.reading.local_polynomials import left_of_noise, smooth
+from ema.discrepancy.axis.reading.noise import Noise
+from ema.discrepancy.axis.reading.pushed import pushed
+from ema.discrepancy.axis.reading.quiet_drive import DEGREE, WIDTHS, quieten
 from ema.models.axis_config import RotaryAxis
 
 N, PERIOD, SIGMA = 4000, 1e-3, 0.01

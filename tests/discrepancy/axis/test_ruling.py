@@ -7,8 +7,8 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.ruling import rule_by_balance
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.judging.ruling import rule_by_balance
 from ema.discrepancy.grade import LIMIT, grade
 from ema.models.axis_config import RotaryAxis
 

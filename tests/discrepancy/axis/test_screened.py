@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from ema.discrepancy.axis.screened import begin_at, suggest_by_balance
+from ema.discrepancy.axis.finding.screened import begin_at, suggest_by_balance
 
 MOTOR, LOAD = "quadratic_load_friction", "quadratic_output_load_friction"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 

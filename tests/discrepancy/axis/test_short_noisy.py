@@ -10,8 +10,8 @@ from types import ModuleType
 
 import pytest
 
-from ema.discrepancy.axis.balance.telling import describe
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.balance.telling.telling import describe
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 SEEDS = (0, 2, 3)

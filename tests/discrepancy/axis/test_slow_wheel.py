@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
 
 

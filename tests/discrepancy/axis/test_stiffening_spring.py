@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema.discrepancy.axis.agreeing import merge
-from ema.discrepancy.axis.balance.telling import describe
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.balance.telling.telling import describe
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.judging.agreeing import merge
 from ema.discrepancy.findings import FoundEffect
 from ema.effects.stiffening_spring import EFFECT, bends, tilts
 from ema.models import axis

@@ -9,9 +9,9 @@ import on_paper
 import pytest
 
 from ema.core.records import Cycle
-from ema.discrepancy.axis.describe import structure as said
-from ema.discrepancy.axis.plant import AxisPlant
-from ema.discrepancy.axis.structure import search
+from ema.discrepancy.axis.finding.describe import structure as said
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.scanning.structure import search
 from ema.models.axis_config import LinearAxis, RotaryAxis
 
 AT = {"F_d": on_paper.F_D}

@@ -6,9 +6,9 @@ from types import ModuleType
 
 import pytest
 
-from ema.discrepancy.axis import wording
-from ema.discrepancy.axis.between import examine_ways
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.examine import findings
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import LinearAxis
 
 
@@ -21,7 +21,7 @@ def positioner(support) -> ModuleType:
 def test_where_a_guide_is_tight_and_by_how_much(positioner, low, high, more):
     bench = positioner.Table(tight=(low, high, more))
     plant = AxisPlant(LinearAxis.model_validate(positioner.table_plant(bench)), [positioner.table(bench, 3)])
-    found = wording.findings(plant, examine_ways(plant))
+    found = findings(plant, examine_ways(plant))
     (e,) = found.effects
     assert e.name == "position_friction"
     half = 0.5 * (high - low)

@@ -7,7 +7,7 @@ import pytest
 
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.undersampled import refuse_undersampled
+from ema.discrepancy.axis.reading.undersampled import refuse_undersampled
 from ema.models.axis_config import RotaryAxis
 
 PLANT = RotaryAxis(J=1e-4, F_d=0.0, k_t=0.05, k_e=0.05, R=1.0, L=1e-3, drive="voltage")

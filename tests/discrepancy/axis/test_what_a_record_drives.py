@@ -11,9 +11,9 @@ import pytest
 
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.channels import roles
-from ema.discrepancy.axis.intake import SHORTEST, ask_of_loop, of_loop, take_in
-from ema.discrepancy.axis.sizes import WARMING, sizes
+from ema.discrepancy.axis.reading.channels import roles
+from ema.discrepancy.axis.reading.intake import SHORTEST, ask_of_loop, of_loop, take_in
+from ema.discrepancy.axis.reading.sizes import WARMING, sizes
 from ema.models.axis_config import PositionLoop, RotaryAxis
 
 BASE = {"J": on_paper.J, "C": on_paper.C, "F_d": on_paper.F_D, "k_t": on_paper.K_T}

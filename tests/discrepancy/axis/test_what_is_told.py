@@ -10,18 +10,18 @@ import on_paper
 import pytest
 from balance_on_paper import PLAIN, J, motion, rows
 
-from ema.discrepancy.axis.balance.agreement import agreements
-from ema.discrepancy.axis.balance.attenuation import attenuation
-from ema.discrepancy.axis.balance.course import courses
-from ema.discrepancy.axis.balance.integrated import integrate_rows as rows_of
-from ema.discrepancy.axis.balance.laws import laws
-from ema.discrepancy.axis.balance.of_records import plain_of
-from ema.discrepancy.axis.balance.regression import regress
-from ema.discrepancy.axis.balance.telling_records import by_record
-from ema.discrepancy.axis.balance.widths import half_widths
-from ema.discrepancy.axis.describe import effects
-from ema.discrepancy.axis.naming import line
-from ema.discrepancy.axis.pictures import pictures
+from ema.discrepancy.axis.balance.laws.laws import laws
+from ema.discrepancy.axis.balance.records.attenuation import attenuation
+from ema.discrepancy.axis.balance.records.course import courses
+from ema.discrepancy.axis.balance.records.integrated import integrate_rows as rows_of
+from ema.discrepancy.axis.balance.records.of_records import plain_of
+from ema.discrepancy.axis.balance.records.widths import half_widths
+from ema.discrepancy.axis.balance.regressing.agreement import agreements
+from ema.discrepancy.axis.balance.regressing.regression import regress
+from ema.discrepancy.axis.balance.telling.telling_records import by_record
+from ema.discrepancy.axis.finding.describe import effects
+from ema.discrepancy.axis.naming.naming import line
+from ema.discrepancy.axis.telling.pictures import pictures
 from ema.discrepancy.plant import Candidate, Free
 from ema.models.axis_config import LinearAxis, RotaryAxis
 

@@ -6,9 +6,9 @@ import numpy as np
 import on_paper
 import pytest
 
-from ema.discrepancy.axis.noise_model import noise_model, position_noise, without_start
-from ema.discrepancy.axis.pack import MEMORY, Pack
-from ema.discrepancy.axis.whitening import Push, design, join, open_loop_variance
+from ema.discrepancy.axis.simulating.noise_model import noise_model, position_noise, without_start
+from ema.discrepancy.axis.simulating.pack import MEMORY, Pack
+from ema.discrepancy.axis.simulating.whitening import Push, design, join, open_loop_variance
 
 H = np.array([[1.0, 0.0], [0.0, 1.0]])  # angle and speed
 DAMPING, N = 200.0, 3000

@@ -6,10 +6,10 @@ import numpy as np
 import on_paper
 import pytest
 
-from ema.discrepancy.axis.fading import SPEEDS, fading_candidate, fadings
-from ema.discrepancy.axis.sizes import sizes
-from ema.discrepancy.axis.stretch import WIDTHS, stretch_candidate
-from ema.discrepancy.axis.weak_form import weak_form
+from ema.discrepancy.axis.reading.sizes import sizes
+from ema.discrepancy.axis.scanning.fading import SPEEDS, fading_candidate, fadings
+from ema.discrepancy.axis.scanning.stretch import WIDTHS, stretch_candidate
+from ema.discrepancy.axis.scanning.weak_form import weak_form
 from ema.effects.position_friction import FORMS
 
 AT = {"F_d": on_paper.F_D}

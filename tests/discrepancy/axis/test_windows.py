@@ -7,8 +7,8 @@ import pytest
 
 from ema.core.errors import RecordError
 from ema.core.records import Cycle, Record
-from ema.discrepancy.axis.noise import estimate, quantum
-from ema.discrepancy.axis.windows import bench
+from ema.discrepancy.axis.reading.noise import estimate, quantum
+from ema.discrepancy.axis.reading.windows import bench
 from ema.models.axis_config import RotaryAxis
 
 PLANT = RotaryAxis(J=1e-4, F_d=0.01, k_t=0.05)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from ema.discrepancy.axis import witness
-from ema.discrepancy.axis.agreeing import merge
+from ema.discrepancy.axis.judging import witness
+from ema.discrepancy.axis.judging.agreeing import merge
 
 
 @pytest.fixture(scope="module")

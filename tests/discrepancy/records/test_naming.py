@@ -10,9 +10,9 @@ from click.testing import CliRunner
 from ema.cli import cli
 from ema.core.errors import ConfigError, NegativeAnswer, RecordError
 from ema.core.records import read_record
-from ema.discrepancy.axis.balance.of_records import balance
-from ema.discrepancy.axis.balance.telling import describe
-from ema.discrepancy.axis.plant import AxisPlant
+from ema.discrepancy.axis.balance.records.of_records import balance
+from ema.discrepancy.axis.balance.telling.telling import describe
+from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models import axis_config
 
 
