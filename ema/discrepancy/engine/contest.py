@@ -175,19 +175,15 @@ class Contest:
     def _integrated(self, entrant: Entrant, predictions: tuple[Prediction, ...], J: Array) -> Weighed:
         parameters = (*self.problem.faults, *(p for c in entrant.causes for p in c.parameters))
         x = np.array([entrant.point.get(p.name, p.neutral) - p.neutral for p in parameters])
-        whole, *halves = predictions
         shares = SHARES if self.law_error.left > 0.0 else SHARES[:1]
-
-        def of(prediction: Prediction) -> Evidence:
-            causes = [c.parameters for c in entrant.causes]
-            return evidence(prediction, J, x, self.problem.faults, causes, self.law_error, shares)
-
-        own = of(whole)
+        whole, *halves = predictions
         # of halves the mean alone: their covariance is of too few
-        moved = [of(replace(whole, mean=half.mean, rest=half.rest)).log_z for half in halves]
+        of = [whole, *(replace(whole, mean=half.mean, rest=half.rest) for half in halves)]
+        causes = [c.parameters for c in entrant.causes]
+        own, *moved = evidence(of, J, x, self.problem.faults, causes, self.law_error, shares)
         step = J @ (own.mean - x)
         felt = float(step @ np.linalg.solve(whole.covariance, step))
-        error = abs(moved[0] - moved[1]) / 2.0
+        error = abs(moved[0].log_z - moved[1].log_z) / 2.0
         return Weighed(entrant, parameters, predictions, J, own, own.log_z + log_prior(entrant.causes), error, felt)
 
     def run(self, entrants: Sequence[Entrant]) -> Outcome:

@@ -22,7 +22,7 @@ from .statistic import Prediction
 
 WIDTHS = (0.25, 1.0, 4.0)  # of the slab, times the usual size
 WEIGHTS = (0.25, 0.5, 0.25)
-NEGLIGIBLE = 30.0  # [nats] behind the best, from which a term of a sum of some thousands does not count
+NEGLIGIBLE = 20.0  # [nats] behind the best, from which a term of a sum of some thousands does not count
 AT_ONCE = 256  # terms whose share within bounds is integrated at a time
 FAULT = 0.3  # prior probability that one fault is there
 
@@ -66,40 +66,44 @@ def log_box(mean: Array, cov: Array, low: Array, high: Array) -> Array:
     cov : array, shape (n, p, p)
     low, high : arrays, shape (p,)
     """
-    m, V = mean.copy(), cov.copy()
+    m, V = mean, cov  # of the coordinates that are left
     total = np.zeros(len(m))
-    for i in range(m.shape[1]):
-        there = V[:, i, i] > 0.0
-        sd = np.sqrt(np.where(there, V[:, i, i], 1.0))
-        a, b = (low[i] - m[:, i]) / sd, (high[i] - m[:, i]) / sd
+    for low_i, high_i in zip(low, high, strict=True):
+        column, m_i = V[:, 1:, 0], m[:, 0]
+        there = V[:, 0, 0] > 0.0
+        sd = np.sqrt(np.where(there, V[:, 0, 0], 1.0))
+        m, V = m[:, 1:], V[:, 1:, 1:]
+        a, b = (low_i - m_i) / sd, (high_i - m_i) / sd
         log_p = log_mass(a, b)
+        if not (log_p[there] < 0.0).any():
+            continue  # every term lies within
         total += np.where(there, log_p, 0.0)
         log_a, log_b = -0.5 * (a**2 + np.log(2.0 * np.pi)) - log_p, -0.5 * (b**2 + np.log(2.0 * np.pi)) - log_p
         pdf_a, pdf_b = np.exp(np.minimum(log_a, 50.0)), np.exp(np.minimum(log_b, 50.0))
         shift = pdf_a - pdf_b
         a_pdf, b_pdf = (np.where(pdf > 0.0, np.clip(x, -1e3, 1e3) * pdf, 0.0) for x, pdf in ((a, pdf_a), (b, pdf_b)))
         narrower = np.clip(1.0 + a_pdf - b_pdf - shift**2, 1e-6, 1.0)
-        column = V[:, :, i] / sd[:, None] * there[:, None]
+        column = column * (there / sd)[:, None]
         m = m + column * shift[:, None]
-        V = V - column[:, :, None] * column[:, None, :] * (1.0 - narrower)[:, None, None]
+        V = V - column[:, :, None] * (column * (1.0 - narrower)[:, None])[:, None, :]
     return total
 
 
 def evidence(
-    prediction: Prediction,
+    predictions: Sequence[Prediction],
     columns: Array,
     at: Array,
     faults: Sequence[Parameter],
     causes: Sequence[Sequence[Parameter]],
     law_error: LawError,
     shares: Sequence[float] = SHARES,
-) -> Evidence:
+) -> list[Evidence]:
     """Integrate the likelihood over sizes, subsets of faults and the law error.
 
     Parameters
     ----------
-    prediction : Prediction
-        At the fitted point.
+    predictions : sequence of Predictions
+        At the fitted point: estimates of one mean and rest, all of the first one's covariance.
     columns : array, shape (d, n_faults + n_parameters)
         Of t, per unit, at the fitted point.
     at : array, shape (n_faults + n_parameters,)
@@ -112,34 +116,39 @@ def evidence(
     low, high = (np.array([getattr(p, end) - p.neutral for p in parameters]) for end in ("low", "high"))
     far = 1e6 * (1.0 + np.abs(at))
     low, high = np.maximum(low, -far), np.minimum(high, far)
-    b = columns @ at - prediction.mean  # = J u + noise
+    prior_mass = np.where(P > 0.0, log_mass(low / np.where(P > 0, P, 1.0), high / np.where(P > 0, P, 1.0)), 0.0)
+    prior = log_prior - prior_mass.sum(axis=1) - np.log(len(shares))
+    b = np.array([columns @ at - prediction.mean for prediction in predictions]).T  # = J u + noise
     found, means, variances = [], [], []
     for share in shares:
-        C = prediction.covariance + law_error.covariance(share)
+        C = predictions[0].covariance + law_error.covariance(share)
         L = cholesky(C, lower=True)
         A, y = (solve_triangular(L, x, lower=True) for x in (columns, b))
-        SA = P[:, :, None] * (A.T @ A) * P[:, None, :]
-        M = np.linalg.inv(SA + np.eye(len(parameters)))
-        V = P[:, :, None] * M * P[:, None, :]
-        mean = V @ (A.T @ y)
-        _, logdet = np.linalg.slogdet(SA + np.eye(len(parameters)))
+        precision = P[:, :, None] * (A.T @ A) * P[:, None, :] + np.eye(len(parameters))
+        V = P[:, :, None] * np.linalg.inv(precision) * P[:, None, :]
+        mean = V @ (A.T @ y)  # (n, p, n_predictions)
         constant = -0.5 * len(y) * np.log(2.0 * np.pi) - np.log(np.diag(L)).sum()
-        gaussian = constant - 0.5 * (float(y @ y) - mean @ (A.T @ y)) - 0.5 * logdet
-        prior_mass = np.where(P > 0.0, log_mass(low / np.where(P > 0, P, 1.0), high / np.where(P > 0, P, 1.0)), 0.0)
-        rest = prediction.log_rest(law_error.of_rest(share))
-        found.append(gaussian - prior_mass.sum(axis=1) + log_prior + rest - np.log(len(shares)))
+        gaussian = constant - 0.5 * ((y**2).sum(axis=0) - np.einsum("npk,pk->nk", mean, A.T @ y))
+        rest = np.array([prediction.log_rest(law_error.of_rest(share)) for prediction in predictions])
+        found.append(gaussian - 0.5 * np.linalg.slogdet(precision)[1][:, None] + prior[:, None] + rest)
         means.append(mean)
         variances.append(V)
     log_z, u, cov = np.concatenate(found), np.concatenate(means), np.concatenate(variances)
     there = np.tile(subsets, (len(shares), 1))
-    var = np.diagonal(cov, axis1=1, axis2=2)
-    log_z = _within(log_z, u, cov, low, high)
+    return [_summed(log_z[:, k], u[:, :, k], cov, there, low, high) for k in range(len(predictions))]
+
+
+def _summed(log_z: Array, mean: Array, cov: Array, there: Array, low: Array, high: Array) -> Evidence:
+    """The sum over terms: Gaussians of log evidence, mean and covariance, with faults that are there, within bounds."""
+    log_z = _within(log_z, mean, cov, low, high)
     total = float(logsumexp(log_z))
-    weight = np.exp(log_z - total)
-    u = np.clip(u, low, high)
+    counts = log_z > -np.inf
+    weight = np.exp(log_z[counts] - total)
+    u = np.clip(mean[counts], low, high)
     expected = weight @ u
+    var = np.diagonal(cov[counts], axis1=1, axis2=2)
     sd = np.sqrt(np.maximum(weight @ (var + u**2) - expected**2, 0.0))
-    return Evidence(total, weight @ there, expected, sd)
+    return Evidence(total, weight @ there[counts], expected, sd)
 
 
 def _within(log_z: Array, mean: Array, cov: Array, low: Array, high: Array) -> Array:

@@ -23,7 +23,7 @@ def test_one_fault_and_one_size_agree_with_the_integral_done_on_a_grid(toys):
     rng = np.random.default_rng(3)
     fault, size = toys.parameter("k1", low=0.0), toys.parameter("size", high=6.0)
     J, t = rng.standard_normal((5, 2)), 2.0 * rng.standard_normal(5)
-    found = evidence(known(-t), J, np.zeros(2), [fault], [[size]], LawError(5, 0.0, 0.0), (0.0,))
+    (found,) = evidence([known(-t)], J, np.zeros(2), [fault], [[size]], LawError(5, 0.0, 0.0), (0.0,))
     k, u = np.linspace(0.0, 60.0, 1501), np.linspace(-60.0, 6.0, 1501)
     like = np.exp(-0.5 * ((t - J[:, 0] * k[:, None, None] - J[:, 1] * u[:, None]) ** 2).sum(axis=-1))
     like /= (2.0 * np.pi) ** 2.5
@@ -83,7 +83,7 @@ def _drawn_toys(toys):
             columns = np.array([J[name] for name in ("k1", "k2", *s)]).T
             of = [c.parameters for c in plant.causes if c.name in s]
             law = LawError(d, 0.0, 0.0)
-            found = evidence(known(-t), columns, np.zeros(columns.shape[1]), plant.faults, of, law, (0.0,))
+            (found,) = evidence([known(-t)], columns, np.zeros(columns.shape[1]), plant.faults, of, law, (0.0,))
             log_z[s] = found.log_z + priors[s]
         yield truth, posterior(log_z, 0.0)
 
