@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from .flat import settle
 from .free import K_FREE, Free
 from .model import FAR, FINAL_SEED, N_FINAL, N_GLANCE, Model, free_again, strip
 
+if TYPE_CHECKING:
+    from ema.discrepancy.engine.contest import Entrant
+
 
 @dataclass
 class Search:
@@ -34,6 +38,7 @@ class Search:
     probed: dict[str, Candidate] = field(default_factory=dict)
     tried: list[Model] = field(default_factory=list)
     minima: list[tuple[Fit, Noise]] = field(default_factory=list)
+    entrants: list[tuple[Fit, Entrant]] = field(default_factory=list)
 
     def is_settled(self, model: Model) -> bool:
         """Whether `model` was brought to its minimum already, by the noise that weighs now."""
@@ -61,10 +66,10 @@ class Search:
             fitted = refit_with_short_steps(self.plant, self.noise, model.fit, self.train)
         return self._judged(model.effects, fitted)
 
-    def fitted_to_all(self, model: Model) -> Model:
+    def fitted_to_all(self, model: Model, to_beat: float = np.inf) -> Model:
         """`model` fitted to training and held-out cycles alike."""
-        cycles = sorted(self.train + self.heldout)
-        fitted = fit(self.plant, self.noise, model.fit.free, model.fit.point, cycles, n_iterations=4)
+        cycles, frees, start = sorted(self.train + self.heldout), model.fit.free, model.fit.point
+        fitted = fit(self.plant, self.noise, frees, start, cycles, n_iterations=4, to_beat=to_beat)
         return self._judged(model.effects, fitted)
 
     def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:

@@ -110,17 +110,20 @@ def _fit_to_all(search: Search, answer: Model) -> list[Model]:
     motion = search.plant.data.motion
     if set(motion[search.heldout]) <= set(motion[search.train]):
         return []
-    best: dict[frozenset[str], Model] = {}
+    best: dict[frozenset[str], Model] = {frozenset(answer.names): answer}
     done: dict[frozenset[str], Model] = {}
     for m in search.tried:
         key = frozenset(m.names)
         if len(m.fit.residuals) == search.plant.data.n_cycles:
-            if m.by is search.noise:
-                done[key] = m
+            done[key] = m  # by whatever noise: that moves a point little, and evidence is taken about it
         elif m.fit.misfit < min(within_reach(answer), best[key].fit.misfit if key in best else np.inf):
             best[key] = m
             done.pop(key, None)  # of a worse start
-    return [done.get(key) or search.fitted_to_all(m) for key, m in best.items()]
+    of_all: list[Model] = []
+    for key, m in best.items():  # the answer's comes first: what cannot come near it is not fitted to the end
+        to_beat = within_reach(of_all[0]) if of_all else np.inf
+        of_all.append(done.get(key) or search.fitted_to_all(m, to_beat))
+    return of_all
 
 
 def _choose_standing(search: Search, first: list[Model]) -> list[Model]:
@@ -144,7 +147,9 @@ def _choose_standing(search: Search, first: list[Model]) -> list[Model]:
 
 
 def _entrant(search: Search, model: Model) -> Entrant:
-    """A fitted model with its columns; those that its fit did not need are simulated."""
+    """A fitted model with its columns, simulated once; those that its fit did not need are simulated."""
+    if there := next((e for fit, e in search.entrants if fit is model.fit), None):
+        return there
     plant, point = search.plant, model.fit.point
     frees = {f.name: f for f in (*K_FREE, *model.fit.free)}
     motions = range(plant.n_motions)
@@ -159,7 +164,9 @@ def _entrant(search: Search, model: Model) -> Entrant:
     for name in names:
         if name not in frees:  # a parameter that a path has fixed
             known |= {(m, name): np.zeros_like(known[m, FAULTS[0]]) for m in motions}
-    return Entrant(causes, point, np.stack([_column(search, known, name) for name in names], axis=1))
+    made = Entrant(causes, point, np.stack([_column(search, known, name) for name in names], axis=1))
+    search.entrants.append((model.fit, made))
+    return made
 
 
 def _column(search: Search, known: dict[tuple[int, str], Array], name: str) -> Array:

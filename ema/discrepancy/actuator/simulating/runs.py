@@ -12,7 +12,7 @@ import numpy as np
 from ema.core.records import Array
 from ema.models import parts
 
-MOST = 6_000  # runs that are remembered: some 100 MB
+MOST = 12_000  # runs that are remembered: some 200 MB
 
 
 class Asked(NamedTuple):
