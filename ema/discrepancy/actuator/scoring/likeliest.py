@@ -83,6 +83,14 @@ def take_likeliest(search: Search, path: Path, found: Answer) -> tuple[Outcome, 
     Where about noise is left, what the score hears all the same is taken for found. Of effects that may stand in each
     other's place the likeliest comes first.
     """
+    outcome, models, found = _listen(search, path, found)
+    found, notes = _prefer_likeliest(search, path, found, outcome, models)
+    alike = [keep_alike(search, found.model, j, rivals) for j, rivals in enumerate(found.alike)]
+    return outcome, replace(found, alike=with_likely(found.model.names, alike, outcome)), notes
+
+
+def _listen(search: Search, path: Path, found: Answer) -> tuple[Outcome, list[Model], Answer]:
+    """All sets weighed, likeliest first, and what was found with all that the score hears beside it."""
     others: list[Model] = []
     while True:
         n = N_RIVALS if found.model.effects else N_FITTED
@@ -96,23 +104,28 @@ def take_likeliest(search: Search, path: Path, found: Answer) -> tuple[Outcome, 
         found = _go_on_from_heard(search, path, found, *heard)
     if rivals := _fit_unweighed(search, found, models):
         outcome, models = weigh_sets(search, path.before, found.model, [*others, *rivals])
+    return outcome, models, found
+
+
+def _prefer_likeliest(
+    search: Search, path: Path, found: Answer, outcome: Outcome, models: Sequence[Model]
+) -> tuple[Answer, list[str]]:
+    """What was found, or of `models` the likeliest where that has what is less likely than not; and notes."""
+    best = models[0]
     sets = [(name, *rivals) for name, rivals in zip(found.model.names, found.alike, strict=True)]
     unlikely = [names[0] for names in sets if not is_named(outcome, found.model, *names)]
-    notes = []
-    if unlikely and (not models[0].effects or is_credible(models[0])):
-        best = models[0]
+    if unlikely and best.effects and not is_credible(best):
+        notes = [f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named"]
+        return Answer(path.before, path.verdict_before, []), notes
+    if unlikely:
         search.say(f"{' + '.join(best.names) or 'faults only'} instead of {' + '.join(found.model.names)}")
         of = dict(zip(found.model.names, found.alike, strict=True))
         v = search.verdict(best) if best.effects else path.verdict_before
-        found = Answer(best, v, [of.get(name, ()) for name in best.names])
-    elif unlikely:
-        notes = [f"{', '.join(unlikely)} would do, but what can be no cause would do much better: not named"]
-        found = Answer(path.before, path.verdict_before, [])
-    elif models[0].names != found.model.names and (led := led_by(models[0].names, found.model.names, found.alike)):
-        search.say(f"{' + '.join(models[0].names)} first: what may be in its place is less likely")
-        found = Answer(models[0], search.verdict(models[0]), led)
-    alike = [keep_alike(search, found.model, j, rivals) for j, rivals in enumerate(found.alike)]
-    return outcome, replace(found, alike=with_likely(found.model.names, alike, outcome)), notes
+        return Answer(best, v, [of.get(name, ()) for name in best.names]), []
+    if best.names != found.model.names and (led := led_by(best.names, found.model.names, found.alike)):
+        search.say(f"{' + '.join(best.names)} first: what may be in its place is less likely")
+        return Answer(best, search.verdict(best), led), []
+    return found, []
 
 
 def _fit_unweighed(search: Search, found: Answer, weighed: Sequence[Model]) -> list[Model]:
