@@ -66,10 +66,10 @@ class Search:
             fitted = refit_with_short_steps(self.plant, self.noise, model.fit, self.train)
         return self._judged(model.effects, fitted)
 
-    def fitted_to_all(self, model: Model, to_beat: float = np.inf) -> Model:
+    def fitted_to_all(self, model: Model) -> Model:
         """`model` fitted to training and held-out cycles alike."""
-        cycles, frees, start = sorted(self.train + self.heldout), model.fit.free, model.fit.point
-        fitted = fit(self.plant, self.noise, frees, start, cycles, n_iterations=4, to_beat=to_beat)
+        cycles = sorted(self.train + self.heldout)
+        fitted = fit(self.plant, self.noise, model.fit.free, model.fit.point, cycles, n_iterations=4)
         return self._judged(model.effects, fitted)
 
     def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:

@@ -110,20 +110,17 @@ def _fit_to_all(search: Search, answer: Model) -> list[Model]:
     motion = search.plant.data.motion
     if set(motion[search.heldout]) <= set(motion[search.train]):
         return []
-    best: dict[frozenset[str], Model] = {frozenset(answer.names): answer}
+    best: dict[frozenset[str], Model] = {}
     done: dict[frozenset[str], Model] = {}
     for m in search.tried:
         key = frozenset(m.names)
         if len(m.fit.residuals) == search.plant.data.n_cycles:
-            done[key] = m  # by whatever noise: that moves a point little, and evidence is taken about it
+            if m.by is search.noise:
+                done[key] = m
         elif m.fit.misfit < min(within_reach(answer), best[key].fit.misfit if key in best else np.inf):
             best[key] = m
             done.pop(key, None)  # of a worse start
-    of_all: list[Model] = []
-    for key, m in best.items():  # the answer's comes first: what cannot come near it is not fitted to the end
-        to_beat = within_reach(of_all[0]) if of_all else np.inf
-        of_all.append(done.get(key) or search.fitted_to_all(m, to_beat))
-    return of_all
+    return [done.get(key) or search.fitted_to_all(m) for key, m in best.items()]
 
 
 def _choose_standing(search: Search, first: list[Model]) -> list[Model]:

@@ -11,7 +11,7 @@ from ema.core.records import Array
 from ema.discrepancy.actuator.finding.screening import Screened, columns_of, rank_to_first_order
 from ema.discrepancy.actuator.finding.weighing import is_credible
 from ema.discrepancy.actuator.fitting.candidates import Way
-from ema.discrepancy.actuator.fitting.fit import columns, stacked_jacobian
+from ema.discrepancy.actuator.fitting.fit import stacked_jacobian
 from ema.discrepancy.actuator.fitting.model import NEAR, Model, ways_of
 from ema.discrepancy.actuator.fitting.problem import as_cause, cost_of
 from ema.discrepancy.actuator.simulating.noise import Verdict
@@ -61,12 +61,9 @@ def fit_faint_effects(
     best: dict[str, Model] = {}
     top = max((gain for gain, _ in nats.values()), default=0.0)
     near = [(gain, s) for gain, s in nats.values() if gain > top - BEHIND]
-    # The fit's own columns are of where it came from: for what is faint that is too far.
-    motions = sorted({int(search.plant.data.motion[c]) for c in search.train})
-    here = columns(search.plant, model.fit.free, model.fit.point, motions) if near else {}
     for _, s in sorted(near, key=lambda of: -of[0])[:n]:
         frees = (*model.fit.free, *s.candidate.frees)
-        m = search.model((*model.effects, s.candidate), frees, s.start, here, 4)
+        m = search.model((*model.effects, s.candidate), frees, s.start, None, 4)
         best[s.candidate.effect] = min(m, best.get(s.candidate.effect, m), key=lambda m: m.fit.misfit)
     return list(best.values())
 
