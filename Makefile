@@ -16,7 +16,7 @@ demo: env
 	@echo "To type 'ema' yourself, once in each terminal: . $(BIN)/activate   (then: ema init tester work)"
 
 # Two processes: the search for hidden effects beside all that waits for clocks and sockets, which runs one by one.
-# SEARCHES=all: further cases of whole searches too, half an hour more; drawn: an eighth of them, by the commit, as in CI.
+# SEARCHES=all: further cases of whole searches too; drawn: an eighth of them, by the commit, as in CI.
 SEARCHES ?= few
 test: env
 	$(BIN)/pytest -n 2 --searches $(SEARCHES)
