@@ -42,7 +42,8 @@ def trial(rig: Rig, first_cycle: int, lifetime: float) -> Trial:
         heard += [cycle for cycle, _ in rig.answers(0.1)]
         number += 1
     rig.kill()
-    newest = max(rig.log.glob("*.mcap"), key=lambda path: path.stat().st_mtime_ns)
+    written = (path for path in rig.log.glob("*.mcap") if path.stat().st_size)  # but for one killed as it was begun
+    newest = max(written, key=lambda path: path.stat().st_mtime_ns)
     with LogReader(newest) as log:
         logged_ns = max((int(frames["t_ns"][-1]) for _, frames in log.frames()), default=0)
         logged = {m.content["cycle"] for m in log.messages(lambda topic: topic == "/estimate/0/linear")}

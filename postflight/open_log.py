@@ -32,17 +32,18 @@ def open_log(paths: Iterable[Path], start: TimeOption = None, end: TimeOption = 
     LogError
         A file is missing, or of a kind that is not known.
     """
+    paths = list(paths)
     found = find_logs(paths, (".mcap", *SUFFIXES))
     kinds = {path.suffix.lower() == ".mcap" for path in found}
     if len(kinds) > 1:
         raise LogError("MCAP logs and logs of other tools cannot be read as one: name one kind only")
-    log: LogReader | ForeignLog = LogReader(found) if kinds == {True} else ForeignLog(found)
+    log: LogReader | ForeignLog = LogReader(paths) if kinds == {True} else ForeignLog(found)
     return _within(log, start, end)
 
 
 def open_mcap(paths: Iterable[Path], start: TimeOption = None, end: TimeOption = None) -> LogReader:
     """Open MCAP logs only. LogError as `open_log`."""
-    return _within(LogReader(find_logs(paths, (".mcap",))), start, end)
+    return _within(LogReader(paths), start, end)
 
 
 def _within(log: Opened, start: TimeOption, end: TimeOption) -> Opened:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ from . import batches, schemas
 from .copies import Copy, each_flight_once
 from .folder import is_held
 from .retention import newest
-from .scan import Damage, McapFile
+from .scan import Damage, McapFile, NotMcapError
 from .segment import BEFORE_KEY
 
 COPY_SUFFIX = ".recovered.mcap"
@@ -45,7 +45,8 @@ class LogReader(Closing):
     Parameters
     ----------
     paths : path or paths
-        Files or directories of files; read in the order of their first messages. Of copies of one flight, one.
+        Files or directories of files; read in the order of their first messages. Of copies of one flight, one. What is
+        no MCAP file in a directory of others is damage: a process that was killed may have left an empty segment.
     start_ns, end_ns : int, optional
         Only what happened in [start_ns, end_ns). [ns since the Unix epoch]
 
@@ -59,7 +60,7 @@ class LogReader(Closing):
     Raises
     ------
     LogError
-        A file is missing, unreadable or not MCAP.
+        A file is missing or unreadable; one that was named is not MCAP, or none of a directory is.
     """
 
     def __init__(
@@ -70,9 +71,7 @@ class LogReader(Closing):
         self._files: list[McapFile] = []
         self.copies: list[Copy] = []
         try:
-            for path in find_logs(paths, (".mcap",)):
-                self._files.append(McapFile(path, self._note))
-            self._files.sort(key=_order)
+            self._open(find_logs(paths, (".mcap",)), _listed(paths))
             self._files, self.copies = self._each_once(self._files)
         except LogError:
             self.close()
@@ -162,6 +161,20 @@ class LogReader(Closing):
         """Key-value pairs of the first segment."""
         return self._files[0].metadata() if self._files else {}
 
+    def _open(self, found: Sequence[Path], named: Sequence[Path]) -> None:
+        refused: list[NotMcapError] = []
+        for path in found:
+            try:
+                self._files.append(McapFile(path, self._note))
+            except NotMcapError as error:
+                if path in named:
+                    raise
+                refused.append(error)
+                self._note(Damage(path, 0, error.what))
+        if refused and not self._files:
+            raise refused[0]
+        self._files.sort(key=_order)
+
     def _each_once(self, files: list[McapFile]) -> tuple[list[McapFile], list[Copy]]:
         kept, copies = each_flight_once(files)
         for file in files:
@@ -186,11 +199,14 @@ def _is_live(path: Path) -> bool:
     return path == newest(path) and is_held(path.parent)
 
 
+def _listed(paths: Paths) -> list[Path]:
+    return [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
+
+
 def find_logs(paths: Paths, suffixes: tuple[str, ...]) -> list[Path]:
     """Files named, and files with one of the suffixes in directories named; LogError when there is none."""
-    given = [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
     found: list[Path] = []
-    for path in given:
+    for path in _listed(paths):
         if path.is_dir():
             inside = sorted(child for child in path.iterdir() if child.suffix.lower() in suffixes)
             if not inside:

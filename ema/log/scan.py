@@ -47,6 +47,14 @@ class Damage(NamedTuple):
         return f"{self.path}: byte {self.offset}: {self.what}"
 
 
+class NotMcapError(LogError):
+    """A file holds nothing of an MCAP file."""
+
+    def __init__(self, path: Path, what: str):
+        super().__init__(f"{path}: {what}")
+        self.what = what
+
+
 class McapFile:
     """One MCAP file.
 
@@ -65,7 +73,7 @@ class McapFile:
     Raises
     ------
     LogError
-        The file cannot be opened, or holds nothing of an MCAP file.
+        The file cannot be opened; NotMcapError where it holds nothing of an MCAP file.
     """
 
     def __init__(self, path: Path, report: Callable[[Damage], None] = lambda damage: None):
@@ -84,7 +92,7 @@ class McapFile:
         if not self._data.is_marked:
             if self._data.begin >= self._size:
                 self.close()
-                raise LogError(f"{path}: is not an MCAP file" + (" (it is empty)" if self._size == 0 else ""))
+                raise NotMcapError(path, "is not an MCAP file" + (" (it is empty)" if self._size == 0 else ""))
             self.note(0, "does not begin as an MCAP file")
 
     def close(self) -> None:

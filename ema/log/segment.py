@@ -46,7 +46,6 @@ class Segment:
 
     def __init__(self, path: Path, t_ns: int, attachments: Mapping[str, bytes], metadata: Mapping[str, str]):
         self.path = path
-        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
         self._tail = _Tail()
         self._writer = NumberedWriter(self._tail, chunk_size=_CHUNK_SIZE)
         self._schemas: dict[str, int] = {}
@@ -58,6 +57,8 @@ class Segment:
             self._writer.add_attachment(
                 t_ns, t_ns, name, _MEDIA_TYPES.get(Path(name).suffix, "application/octet-stream"), data
             )
+        # Last, so that a process which is killed hardly ever leaves a file with nothing in it.
+        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
         try:
             self.commit()
             _sync_directory(path.parent)

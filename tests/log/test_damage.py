@@ -100,6 +100,22 @@ def test_what_is_no_log_is_refused_in_one_line(tmp_path, content):
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.parametrize("content", [b"", b"hello"], ids=["empty", "text"])
+def test_what_a_kill_left_empty_costs_nothing_else_in_its_folder(tmp_path, make, content):
+    path, _ = _log(tmp_path, make)
+    empty = path.with_name("ema-29991231T000000000Z-0002.mcap")
+    empty.write_bytes(content)
+    with LogReader(tmp_path) as log:
+        assert [m.content["cycle"] for m in log.messages(lambda topic: topic.startswith("/estimate"))] == list(range(CHUNKS))
+        assert [line for line in log.complaints() if str(empty) in line and "is not an MCAP file" in line]
+        assert log.paths == [path]
+    with pytest.raises(LogError, match="is not an MCAP file"):  # it was asked for by name
+        LogReader([path, empty])
+    path.unlink()
+    with pytest.raises(LogError, match="is not an MCAP file"):  # nothing else is there
+        LogReader(tmp_path)
+
+
 def test_recovery_writes_a_finished_copy_beside_and_never_over(tmp_path, make):
     path, _ = _log(tmp_path, make, finish=False)
     before = path.read_bytes()

@@ -3,6 +3,7 @@
 Run as a program (no threads, so that it may fork): `python log_kill.py DIRECTORY TRIALS SEED` prints one JSON line.
 """
 
+import ctypes
 import json
 import os
 import signal
@@ -62,16 +63,25 @@ def child(directory):
         told.stalled(time.monotonic_ns() - t_ns - int(1e9 * STEP))
 
 
+def _end_with_parent():
+    """A trial that fails ends all others: what waits for this program's output would wait for them too."""
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+
+
 def survivors(directory):
-    """Numbers and last time of the events in a log, after recovery of what is not finished."""
-    for path in sorted(directory.glob("*.mcap")):
+    """Last time of the events in a log, None without any, after recovery of what is not finished."""
+    empty = {path for path in directory.glob("*.mcap") if path.stat().st_size == 0}  # killed as it was begun
+    paths = sorted(set(directory.glob("*.mcap")) - empty)
+    for path in paths:
         if not is_sound(path):
             recover(path, path.with_suffix(".recovered"))
             path.unlink()
             path.with_suffix(".recovered").rename(path)
+    if not paths:
+        return None
     with LogReader(directory) as log:
         events = [(int(m.content["text"]), m.t_ns) for m in log.messages()]
-        assert not log.damage
+        assert {damage.path for damage in log.damage} == empty
     assert [n for n, _ in events] == list(range(len(events))), "a hole in the log"
     return events[-1][1] if events else None
 
@@ -86,6 +96,7 @@ def main(directory, trials, seed):
             place.mkdir()
             pid = os.fork()
             if pid == 0:
+                _end_with_parent()
                 child(place)
             running.append((pid, place, time.monotonic() + rng.uniform(INTERVAL, 4 * INTERVAL)))
         for pid, place, moment in sorted(running, key=lambda run: run[2]):
