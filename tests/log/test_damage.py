@@ -106,7 +106,8 @@ def test_what_a_kill_left_empty_costs_nothing_else_in_its_folder(tmp_path, make,
     empty = path.with_name("ema-29991231T000000000Z-0002.mcap")
     empty.write_bytes(content)
     with LogReader(tmp_path) as log:
-        assert [m.content["cycle"] for m in log.messages(lambda topic: topic.startswith("/estimate"))] == list(range(CHUNKS))
+        estimates = log.messages(lambda topic: topic.startswith("/estimate"))
+        assert [m.content["cycle"] for m in estimates] == list(range(CHUNKS))
         assert [line for line in log.complaints() if str(empty) in line and "is not an MCAP file" in line]
         assert log.paths == [path]
     with pytest.raises(LogError, match="is not an MCAP file"):  # it was asked for by name
