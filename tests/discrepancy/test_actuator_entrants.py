@@ -75,3 +75,24 @@ def test_of_two_ways_in_which_a_clock_may_be_off_the_likelier_stands_for_it(hidd
     assert outcome.posterior[0].probability > 0.9
     rate, sd = outcome.sizes("clock_skew")["clock_skew.shared"]
     assert abs(rate - 1e-3) < 3.0 * sd
+
+
+@pytest.mark.slow
+def test_a_fault_that_was_dropped_for_an_effect_is_weighed_as_one_that_may_be_there(hidden, shipped_plant):
+    """A weaker magnet with shorts of all phases: the least was dropped, and what it had went to magnet and others."""
+    k = {"k3": 0.05, "k4": 0.026, "k5": 0.031}
+    made = hidden.cycles(hidden.Flaws(flux=-0.06, **k), 4, 31, motions=(hidden.chirp(duration=0.25),))
+    record = Record(tuple(Cycle(n, c) for n, c in enumerate(made)))
+    plant = EmaPlant(shipped_plant, prepare(shipped_plant, [record]), 2)
+    search = Search(plant, Noise(plant, {}), [0, 1], [2, 3])
+    before = start_model(search, {})
+    c = next(c for c in candidates(shipped_plant, plant.data, ()) if c.effect == "magnet_flux")
+    frees = (*(f for f in K_FREE if f.name != "k4"), *c.frees)
+    start = {"magnet_flux.change": -0.085, "k3": 0.025, "k5": 0.006}
+    outcome, models = weigh_sets(search, before, search.model((c,), frees, start, None, 6))
+    assert models[0].names == ("magnet_flux",)
+    found = {**outcome.sizes_of_faults(k), **outcome.sizes("magnet_flux")}
+    for name, truth in (k | {"magnet_flux.change": -0.06}).items():
+        value, sd = found[name]
+        assert abs(value - truth) < 3.0 * sd, name
+        assert sd < 0.02

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ema.core.names import FAULTS
 from ema.core.records import Array
 from ema.discrepancy.actuator.reading.weak import Torque, torque
 from ema.discrepancy.actuator.simulating.noise import Noise, Verdict, judge
@@ -39,6 +40,7 @@ class Search:
     tried: list[Model] = field(default_factory=list)
     minima: list[tuple[Fit, Noise]] = field(default_factory=list)
     entrants: list[tuple[Fit, Entrant]] = field(default_factory=list)
+    freed: list[tuple[Fit, Model]] = field(default_factory=list)
 
     def is_settled(self, model: Model) -> bool:
         """Whether `model` was brought to its minimum already, by the noise that weighs now."""
@@ -65,6 +67,21 @@ class Search:
         if fitted is model.fit:
             fitted = refit_with_short_steps(self.plant, self.noise, model.fit, self.train)
         return self._judged(model.effects, fitted)
+
+    def with_all_faults(self, model: Model) -> Model:
+        """`model` with every fault free, at its minimum; itself where all are free already.
+
+        A fault that was dropped since an effect can stand for it may still be there: how far, and what that does to
+        the others, is told from where all of them are free.
+        """
+        if set(FAULTS) <= {f.name for f in model.fit.free}:
+            return model
+        if there := next((m for dropped, m in self.freed if dropped is model.fit), None):
+            return there
+        frees = (*K_FREE, *(f for f in model.fit.free if f.name not in FAULTS))
+        made = self.settled(self.model(model.effects, frees, model.fit.point, None, 4))
+        self.freed.append((model.fit, made))
+        return made
 
     def fitted_to_all(self, model: Model) -> Model:
         """`model` fitted to training and held-out cycles alike."""

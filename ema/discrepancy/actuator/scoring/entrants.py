@@ -39,6 +39,7 @@ def weigh_sets(
     """
     search.say("probabilities of what was tried")
     problem = ActuatorProblem(search.plant)
+    after = search.with_all_faults(after)
     fitted = [before, after, *_fit_subsets(search, after), *_fit_to_all(search, after), *others]
     while True:
         models = _choose_standing(search, fitted)
