@@ -40,12 +40,13 @@ def fitted(effects, point, heldout=1.0, frees=None, sd=None):
 class Search:
     """Fits leave what `leaves` says of them; nothing is simulated."""
 
-    def __init__(self, leaves=lambda model: 1.0, zero=0.0, verdict=NOISE, tried=()):
+    def __init__(self, leaves=lambda model: 1.0, zero=0.0, verdict=NOISE, tried=(), at_minimum=lambda model: model):
         sensors = SimpleNamespace(lvdt_step=1e-6)
         motor, gear = SimpleNamespace(p=2), SimpleNamespace(GR=500.0)
         plant = SimpleNamespace(sensors=sensors, motor=motor, transmission=gear)
         self.plant = SimpleNamespace(plant=plant, data=SimpleNamespace(zero=zero))
         self.leaves, self.noise, self._verdict, self.made, self.tried = leaves, None, verdict, [], list(tried)
+        self.at_minimum = at_minimum
 
     def model(self, effects, frees, start, known, n_iterations):
         made = fitted(effects, dict(start), frees=frees)
@@ -158,3 +159,15 @@ def test_a_rival_stays_one_only_if_it_does_as_well_beside_what_was_found_later()
     search = Search(tried=[as_well, no_longer])
     assert keep_alike(search, model, 0, ("inertia", "current_gain", "viscous_drag")) == ("inertia",)
     assert keep_alike(search, model, 1, ("current_gain",)) == ("current_gain",)  # the last was held against them
+
+
+def test_a_rival_near_noise_is_one_by_what_it_leaves_at_its_minimum():
+    """A position that is late with a record that is late is a late controller with a later record, almost."""
+    model = fitted((FLUX, DRAG), SHORTS)
+    near = fitted((candidate("inertia", "change"),), {}, heldout=1.2)
+    far = fitted((candidate("current_gain", "gain_a"),), {}, heldout=3.0)
+    there = {id(near): fitted(near.effects, {}, heldout=1.0)}  # what is far is not asked for
+    search = Search(tried=[near, far], at_minimum=lambda m: there[id(m)])
+    assert keep_alike(search, model, 0, ("inertia", "current_gain")) == ("inertia",)
+    stays = Search(tried=[near], at_minimum=lambda m: m)
+    assert keep_alike(stays, model, 0, ("inertia",)) == ()

@@ -12,7 +12,7 @@ import numpy as np
 from ema.core.names import FAULTS
 from ema.discrepancy.actuator.fitting.candidates import Candidate, Way, candidates, resolver_zero
 from ema.discrepancy.actuator.fitting.free import Free
-from ema.discrepancy.actuator.fitting.model import CHANCE, K_SEEN, Model, strip
+from ema.discrepancy.actuator.fitting.model import CHANCE, K_SEEN, NEAR, Model, strip
 from ema.discrepancy.actuator.simulating.noise import Noise, Verdict
 from ema.discrepancy.plant import Point
 from ema.effects import registry
@@ -147,6 +147,7 @@ def fit_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...])
     """The rivals of one effect fitted in its place, beside the effects that were found after it.
 
     None for the last effect, whose rivals were fitted so already, and none of what was never fitted as a last effect.
+    Near noise a rival is at its minimum: what a fit has still to go counts there.
     """
     if place == len(model.effects) - 1:
         return {}
@@ -154,7 +155,8 @@ def fit_alike(search: Search, model: Model, place: int, rivals: tuple[str, ...])
     for rival in (r for r in rivals if r not in model.names):
         beside = [m for m in search.tried if m.names and m.names[-1] == rival]
         if beside:
-            found[rival] = search.instead(model, model.effects[place], beside[-1])
+            made = search.instead(model, model.effects[place], beside[-1])
+            found[rival] = search.at_minimum(made) if made.excess < NEAR else made
     return found
 
 

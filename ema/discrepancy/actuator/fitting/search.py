@@ -40,7 +40,8 @@ class Search:
     tried: list[Model] = field(default_factory=list)
     minima: list[tuple[Fit, Noise]] = field(default_factory=list)
     entrants: list[tuple[Fit, Entrant]] = field(default_factory=list)
-    freed: list[tuple[Fit, Model]] = field(default_factory=list)
+    whole: list[tuple[Fit, Model]] = field(default_factory=list)
+    replaced: list[tuple[Fit, str, Model]] = field(default_factory=list)
 
     def is_settled(self, model: Model) -> bool:
         """Whether `model` was brought to its minimum already, by the noise that weighs now."""
@@ -68,19 +69,21 @@ class Search:
             fitted = refit_with_short_steps(self.plant, self.noise, model.fit, self.train)
         return self._judged(model.effects, fitted)
 
-    def with_all_faults(self, model: Model) -> Model:
-        """`model` with every fault free, at its minimum; itself where all are free already.
+    def at_minimum(self, model: Model) -> Model:
+        """`model` with every fault free, settled once; itself where it is that already.
 
         A fault that was dropped since an effect can stand for it may still be there: how far, and what that does to
         the others, is told from where all of them are free.
         """
-        if set(FAULTS) <= {f.name for f in model.fit.free}:
+        is_whole = set(FAULTS) <= {f.name for f in model.fit.free}
+        if is_whole and self.is_settled(model):
             return model
-        if there := next((m for dropped, m in self.freed if dropped is model.fit), None):
+        if there := next((m for of, m in self.whole if of is model.fit and m.by is self.noise), None):
             return there
         frees = (*K_FREE, *(f for f in model.fit.free if f.name not in FAULTS))
-        made = self.settled(self.model(model.effects, frees, model.fit.point, None, 4))
-        self.freed.append((model.fit, made))
+        made = self.settled(model if is_whole else self.model(model.effects, frees, model.fit.point, None, 4))
+        self.whole.append((model.fit, made))
+        self.minima.append((made.fit, self.noise))
         return made
 
     def fitted_to_all(self, model: Model) -> Model:
@@ -150,12 +153,17 @@ class Search:
         return self.model(effects, free_again(frees, effect), point, model.fit.columns, 3, to_beat)
 
     def instead(self, model: Model, effect: Candidate, rival: Model) -> Model:
-        """The model fitted anew with the last effect of `rival` in the place of one of its own."""
-        effects, frees, point = strip(model, effect)
+        """The model fitted anew with the last effect of `rival` in the place of one of its own, once."""
         c = rival.effects[-1]
+        of_it = (m for of, gone, m in self.replaced if of is model.fit and gone == effect.effect)
+        if there := next((m for m in of_it if m.effects[-1].way == c.way and m.by is self.noise), None):
+            return there
+        effects, frees, point = strip(model, effect)
         start = {name: x for name, x in rival.fit.point.items() if name.startswith(f"{c.effect}.")}
         frees = (*free_again(frees, effect), *c.frees)
-        return self.model((*effects, c), frees, {**point, **start}, None, 4)
+        made = self.model((*effects, c), frees, {**point, **start}, None, 4)
+        self.replaced.append((model.fit, effect.effect, made))
+        return made
 
     def better(self, starts: Sequence[Point], model: Model) -> tuple[Point, float]:
         """The start that simulates closest to the training cycles, and its cost."""
