@@ -184,21 +184,18 @@ class Prediction:
 def _covariance(statistic: Statistic, records: Simulated) -> Array:
     """Covariance of what one record differs from the mean of all by, (d, d).
 
-    What is random differs from block to block: covariances of blocks add, and few records tell them. What a grid of
-    integration makes is the same in all blocks, and no record tells its grid.
+    What is random differs from block to block: covariances of blocks add, and few records tell them. The inverse of a
+    shrunk correlation is not too large, as that of a sample's own is: it takes no factor for its few rows. What a grid
+    of integration makes is the same in all blocks, and no record tells its grid.
     """
     grids = [records.features[records.grid == g] for g in range(records.grids)]
     means = np.array([x.mean(axis=0) for x in grids])
     away = [np.sqrt(len(x) / (len(x) - 1.0)) * (x - m) for x, m in zip(grids, means, strict=True)]
     parts = statistic.by_block(np.concatenate(away))
-    n_blocks, d = parts.shape[1:]
+    n, n_blocks, d = parts.shape
     rows = parts.reshape(-1, d)
     sd = np.sqrt((rows**2).mean(axis=0))
-    n = len(records.features)
-    freedom = (n - records.grids) * n_blocks
-    # an inverse of few rows is too large (Hartlap, Simon and Schneider, Astron. Astrophys. 464, 2007)
-    inverse = (freedom - 1.0) / max(freedom - d - 2.0, 1.0)
-    random = n_blocks * inverse * shrunk_correlation(rows / sd) * np.outer(sd, sd)
+    random = n_blocks * shrunk_correlation(rows / sd) * np.outer(sd, sd)
     if records.grids == 1:
         return np.asarray((1.0 + 1.0 / n) * random)
     t = statistic(means - means.mean(axis=0))[0]
