@@ -70,8 +70,9 @@ class LogReader(Closing):
         self.start_ns, self.end_ns = start_ns, end_ns
         self._files: list[McapFile] = []
         self.copies: list[Copy] = []
+        given = _listed(paths)
         try:
-            self._open(find_logs(paths, (".mcap",)), _listed(paths))
+            self._open(find_logs(given, (".mcap",)), given)
             self._files, self.copies = self._each_once(self._files)
         except LogError:
             self.close()

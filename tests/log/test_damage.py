@@ -111,7 +111,7 @@ def test_what_a_kill_left_empty_costs_nothing_else_in_its_folder(tmp_path, make,
         assert [line for line in log.complaints() if str(empty) in line and "is not an MCAP file" in line]
         assert log.paths == [path]
     with pytest.raises(LogError, match="is not an MCAP file"):  # it was asked for by name
-        LogReader([path, empty])
+        LogReader(iter([path, empty]))
     path.unlink()
     with pytest.raises(LogError, match="is not an MCAP file"):  # nothing else is there
         LogReader(tmp_path)
