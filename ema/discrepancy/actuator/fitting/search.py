@@ -20,7 +20,7 @@ from .candidates import Candidate
 from .fit import N_SEEDS, SEED, Columns, Fit, columns_of_all, fit, refit_with_short_steps, residuals, residuals_at
 from .flat import settle
 from .free import K_FREE, Free
-from .model import FAR, FINAL_SEED, N_FINAL, N_GLANCE, Model, free_again, strip
+from .model import DISTANT, FAR, FINAL_SEED, N_FINAL, N_GLANCE, Model, free_again, strip
 
 if TYPE_CHECKING:
     from ema.discrepancy.engine.contest import Entrant
@@ -70,13 +70,13 @@ class Search:
         return self._judged(model.effects, fitted)
 
     def at_minimum(self, model: Model) -> Model:
-        """`model` with every fault free, settled once; itself where it is that already.
+        """`model` with every fault free, settled once; itself where it is that already, or far from the data.
 
         A fault that was dropped since an effect can stand for it may still be there: how far, and what that does to
         the others, is told from where all of them are free.
         """
         is_whole = set(FAULTS) <= {f.name for f in model.fit.free}
-        if is_whole and self.is_settled(model):
+        if not model.effects or model.excess >= DISTANT or (is_whole and self.is_settled(model)):
             return model
         if there := next((m for of, m in self.whole if of is model.fit and m.by is self.noise), None):
             return there

@@ -12,7 +12,7 @@ from ema.core.records import Array
 from ema.discrepancy.actuator.finding.weighing import within_reach
 from ema.discrepancy.actuator.fitting.fit import columns
 from ema.discrepancy.actuator.fitting.free import K_FREE, Free, goes_with_temperature
-from ema.discrepancy.actuator.fitting.model import DISTANT, Model, ways_of
+from ema.discrepancy.actuator.fitting.model import Model, ways_of
 from ema.discrepancy.actuator.fitting.problem import ActuatorProblem, as_cause
 from ema.discrepancy.actuator.simulating.noise import SEED, Noise
 from ema.discrepancy.engine.contest import EXPANSIONS, Contest, Entrant, Outcome
@@ -39,7 +39,7 @@ def weigh_sets(
     """
     search.say("probabilities of what was tried")
     problem = ActuatorProblem(search.plant)
-    after = search.at_minimum(after) if after.effects and after.excess < DISTANT else after
+    after = search.at_minimum(after)
     fitted = [before, after, *_fit_subsets(search, after), *_fit_to_all(search, after), *others]
     while True:
         models = _choose_standing(search, fitted)
