@@ -203,7 +203,9 @@ def test_a_heavier_rotor_beside_drag_is_no_weaker_magnet_for_sure(hidden, shippe
     beside = {m.names[-1]: m for m in fit_with_one_more(search, found, rank_to_first_order(search, found))}
     assert beside["inertia"].heldout < found.heldout
     assert beside["inertia"].fit.point["viscous_drag.coefficient"] == pytest.approx(7.37e-5, rel=0.02)
-    assert beside["inertia"].fit.point["k1"] == pytest.approx(0.057, abs=3e-3)
+    # Four steps: three shorts of 1.5 % still stand for a part of both, which further steps and the score take away.
+    assert beside["inertia"].fit.point["k1"] == pytest.approx(0.057, rel=0.15)
+    assert beside["inertia"].fit.point["inertia.change"] == pytest.approx(0.126, rel=0.15)
 
 
 @pytest.mark.further
