@@ -15,7 +15,7 @@ from scipy.stats import chi2
 
 from .evidence import Evidence, evidence
 from .hypothesis import Array, Cause, Parameter, Point, Problem
-from .law_error import SHARES, LawError
+from .law_error import NO_SHARE, SHARES, LawError
 from .posterior import Entry, log_prior, posterior
 from .records import Pool, Simulated, simulate
 from .secants import learn_from
@@ -175,7 +175,7 @@ class Contest:
     def _integrated(self, entrant: Entrant, predictions: tuple[Prediction, ...], J: Array) -> Weighed:
         parameters = (*self.problem.faults, *(p for c in entrant.causes for p in c.parameters))
         x = np.array([entrant.point.get(p.name, p.neutral) - p.neutral for p in parameters])
-        shares = SHARES if self.law_error.left > 0.0 else SHARES[:1]
+        shares = SHARES if self.law_error.left > 0.0 else NO_SHARE
         whole, *halves = predictions
         # of halves the mean alone: their covariance is of too few
         of = [whole, *(replace(whole, mean=half.mean, rest=half.rest) for half in halves)]

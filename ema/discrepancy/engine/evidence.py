@@ -7,7 +7,7 @@ points of calibration), cut at what is credible. Then all integrals are of Gauss
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -96,7 +96,7 @@ def evidence(
     faults: Sequence[Parameter],
     causes: Sequence[Sequence[Parameter]],
     law_error: LawError,
-    shares: Sequence[float] = SHARES,
+    shares: Mapping[float, float] = SHARES,
 ) -> list[Evidence]:
     """Integrate the likelihood over sizes, subsets of faults and the law error.
 
@@ -117,10 +117,10 @@ def evidence(
     far = 1e6 * (1.0 + np.abs(at))
     low, high = np.maximum(low, -far), np.minimum(high, far)
     prior_mass = np.where(P > 0.0, log_mass(low / np.where(P > 0, P, 1.0), high / np.where(P > 0, P, 1.0)), 0.0)
-    prior = log_prior - prior_mass.sum(axis=1) - np.log(len(shares))
+    prior = log_prior - prior_mass.sum(axis=1)
     b = np.array([columns @ at - prediction.mean for prediction in predictions]).T  # = J u + noise
     found, means, variances = [], [], []
-    for share in shares:
+    for share, p_share in shares.items():
         C = predictions[0].covariance + law_error.covariance(share)
         L = cholesky(C, lower=True)
         A, y = (solve_triangular(L, x, lower=True) for x in (columns, b))
@@ -130,7 +130,7 @@ def evidence(
         constant = -0.5 * len(y) * np.log(2.0 * np.pi) - np.log(np.diag(L)).sum()
         gaussian = constant - 0.5 * ((y**2).sum(axis=0) - np.einsum("npk,pk->nk", mean, A.T @ y))
         rest = np.array([prediction.log_rest(law_error.of_rest(share)) for prediction in predictions])
-        found.append(gaussian - 0.5 * np.linalg.slogdet(precision)[1][:, None] + prior[:, None] + rest)
+        found.append(gaussian - 0.5 * np.linalg.slogdet(precision)[1][:, None] + prior[:, None] + np.log(p_share) + rest)
         means.append(mean)
         variances.append(V)
     log_z, u, cov = np.concatenate(found), np.concatenate(means), np.concatenate(variances)

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from ema.discrepancy.engine.evidence import FAULT, WEIGHTS, WIDTHS, evidence, log_box
-from ema.discrepancy.engine.law_error import LawError
+from ema.discrepancy.engine.law_error import NO_SHARE, SHARES, LawError
 from ema.discrepancy.engine.posterior import log_prior, posterior
 from ema.discrepancy.engine.statistic import Prediction
 
@@ -23,7 +23,7 @@ def test_one_fault_and_one_size_agree_with_the_integral_done_on_a_grid(toys):
     rng = np.random.default_rng(3)
     fault, size = toys.parameter("k1", low=0.0), toys.parameter("size", high=6.0)
     J, t = rng.standard_normal((5, 2)), 2.0 * rng.standard_normal(5)
-    (found,) = evidence([known(-t)], J, np.zeros(2), [fault], [[size]], LawError(5, 0.0, 0.0), (0.0,))
+    (found,) = evidence([known(-t)], J, np.zeros(2), [fault], [[size]], LawError(5, 0.0, 0.0), NO_SHARE)
     k, u = np.linspace(0.0, 60.0, 1501), np.linspace(-60.0, 6.0, 1501)
     like = np.exp(-0.5 * ((t - J[:, 0] * k[:, None, None] - J[:, 1] * u[:, None]) ** 2).sum(axis=-1))
     like /= (2.0 * np.pi) ** 2.5
@@ -83,7 +83,7 @@ def _drawn_toys(toys):
             columns = np.array([J[name] for name in ("k1", "k2", *s)]).T
             of = [c.parameters for c in plant.causes if c.name in s]
             law = LawError(d, 0.0, 0.0)
-            (found,) = evidence([known(-t)], columns, np.zeros(columns.shape[1]), plant.faults, of, law, (0.0,))
+            (found,) = evidence([known(-t)], columns, np.zeros(columns.shape[1]), plant.faults, of, law, NO_SHARE)
             log_z[s] = found.log_z + priors[s]
         yield truth, posterior(log_z, 0.0)
 
@@ -102,6 +102,22 @@ def test_what_is_said_with_probability_p_is_right_p_of_the_time(toys):
         n, mean = int(inside.sum()), float(p[inside].mean())
         least, most = stats.binom.interval(0.999, n, mean)  # seven bins
         assert least <= hit[inside].sum() <= most, (low, high, n, mean, hit[inside].mean())
+
+
+def test_intervals_hold_what_they_say_where_the_law_is_the_librarys_half_of_the_time(toys):
+    """And where it is of another form by a share that is drawn as the prior has it."""
+    rng = np.random.default_rng(7)
+    d, left = 10, 4e4
+    law = LawError(d, left, 0.0)
+    size = toys.parameter("size", high=60.0)
+    z = []
+    for share in rng.choice(list(SHARES), size=600, p=list(SHARES.values())):
+        J, u = rng.standard_normal((d, 1)), rng.choice(WIDTHS, p=WEIGHTS) * size.usual * rng.standard_normal()
+        t = J[:, 0] * u + np.sqrt(1.0 + law.covariance(share)[0, 0]) * rng.standard_normal(d)
+        (found,) = evidence([known(-t)], J, np.zeros(1), [], [[size]], law)
+        z.append((found.mean[0] - u) / found.sd[0])
+    for p, tolerance in ((0.5, 0.065), (0.9, 0.04)):  # three deviations of 600
+        assert np.mean(np.abs(z) < stats.norm.isf((1.0 - p) / 2.0)) == pytest.approx(p, abs=tolerance)
 
 
 def test_no_probability_is_surer_than_the_evidence():

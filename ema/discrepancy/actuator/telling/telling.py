@@ -32,7 +32,6 @@ from .remains import Remains, remains
 if TYPE_CHECKING:
     from ema.discrepancy.actuator.fitting.search import Search
 
-IMPLEMENTATION = 5e-4  # of a value: what honest simulations of the same laws make of it (steps, starts, sampling)
 MOST_OF_IT = 0.95  # share of what faults alone leave that effects must explain to be named beside an unexplained rest
 UNCERTAIN_LAW = 0.85  # of a confidence where it may be another law altogether: what is left is no chance
 IN_LIBRARY = 0.99  # probability that what does it is in the library at all, where it leaves nothing
@@ -230,7 +229,7 @@ def _describe_effect(
         name = f"{effect}.{p.name}"
         if name in bounds:
             value, own = sizes[name]
-            parts = [max(own, least_sd.get(name, 0.0)), IMPLEMENTATION * value, FORM * rest * value]
+            parts = [max(own, least_sd.get(name, 0.0)), FORM * rest * value]
             sd = float(np.linalg.norm([*parts, e.least_sd.get(p.name, 0.0)]))
             f = bounds[name]
             values[p.name] = value
