@@ -32,7 +32,10 @@ def test_drag_by_the_square_of_the_speed_is_not_told_as_stribeck_friction_that_l
     findings = made.findings
     assert {e.name for e in findings.effects} == {"viscous_drag", "quadratic_drag"}
     drag = next(e for e in findings.effects if e.name == "quadratic_drag")
-    assert drag.confidence > 0.9
+    # Once Stribeck friction is at its own minimum it is 1.5 nats behind: told as what it may be, and no more than that.
+    assert set(drag.indistinguishable_from) <= {"stribeck"}
+    assert drag.confidence > 0.5
+    assert drag.confidence + drag.of_others > 0.95
     assert drag.parameters["coefficient"].value == pytest.approx(a.values["quadratic"], rel=0.1)
     assert findings.gain.k_after == pytest.approx(a.k, abs=2e-3)
 
