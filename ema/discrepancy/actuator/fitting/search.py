@@ -89,7 +89,8 @@ class Search:
     def fitted_to_all(self, model: Model) -> Model:
         """`model` fitted to training and held-out cycles alike."""
         cycles = sorted(self.train + self.heldout)
-        fitted = fit(self.plant, self.noise, model.fit.free, model.fit.point, cycles, n_iterations=4)
+        of, known = model.fit, columns_of_all(self.plant, model.fit)
+        fitted = fit(self.plant, self.noise, of.free, of.point, cycles, known=known, n_iterations=4)
         return self._judged(model.effects, fitted)
 
     def _judged(self, effects: Sequence[Candidate], fitted: Fit) -> Model:
