@@ -12,6 +12,7 @@ from ema.core.errors import RecordError
 from ema.core.records import Array, Record
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.findings import Findings
+from ema.discrepancy.plant import Point
 from ema.discrepancy.progress import Progress
 from ema.discrepancy.report import Picture
 from ema.identification.alignment import aligned
@@ -90,26 +91,34 @@ def examine(plant: Actuator, data: Measured, *, n_threads: int = 2, say: Progres
         raise RecordError(
             f"{data.labels[0]}: is the only cycle; at least {MIN_CYCLES} are needed, to test on one what another says"
         )
-    say = say or Progress()
+    search, conditions = begin(plant, data, n_threads, say or Progress(), {})
+    taken = search.plant.plant
+    search, path, of_each = _find_path(search)
+    outcome, answer, notes = take_likeliest(search, path, _prefer_fewer_causes(search, path))
+    findings, after = _write(search, path, answer, outcome, of_each)
+    findings.notes.extend([*conditions, *notes])
+    if findings.verdict == "adequate":
+        findings.notes.extend(path.as_well)
+    if of_each is not None:
+        findings.notes.append(describe(search.plant.data.faults, after.fit.point))
+    findings.notes.extend(_describe_conditions(search.plant))
+    findings = add_user_friction(plant, taken, findings)
+    return Examination(findings, search, path.before, after, path.verdict_before, answer.verdict)
+
+
+def begin(plant: Actuator, data: Measured, n_threads: int, say: Progress, point: Point) -> tuple[Search, list[str]]:
+    """The search for what a record hides, under the conditions of the record, and what is to be told of these.
+
+    Its noise is that near `point`.
+    """
     data, left_out = thin(data)
-    as_stated = plant
     train, heldout = split(data)
     plant, conditions = take_recorded_conditions(plant, data.signals)
     gear = find_resonance(plant, data)
     plant, data = take_hold_of_user(plant, start_swinging(data, gear))
     ema = EmaPlant(plant, data, n_threads, gear)
     say("switching noise")
-    search, path, of_each = _find_path(Search(ema, Noise(ema, {}), train, heldout, say))
-    outcome, answer, notes = take_likeliest(search, path, _prefer_fewer_causes(search, path))
-    findings, after = _write(search, path, answer, outcome, of_each)
-    findings.notes.extend([*conditions, *([left_out] if left_out else []), *notes])
-    if findings.verdict == "adequate":
-        findings.notes.extend(path.as_well)
-    if of_each is not None:
-        findings.notes.append(describe(search.plant.data.faults, after.fit.point))
-    findings.notes.extend(_describe_conditions(search.plant))
-    findings = add_user_friction(as_stated, plant, findings)
-    return Examination(findings, search, path.before, after, path.verdict_before, answer.verdict)
+    return Search(ema, Noise(ema, point), train, heldout, say), [*conditions, *([left_out] if left_out else [])]
 
 
 def _find_path(search: Search) -> tuple[Search, Way, Array | None]:

@@ -130,7 +130,8 @@ def evidence(
         constant = -0.5 * len(y) * np.log(2.0 * np.pi) - np.log(np.diag(L)).sum()
         gaussian = constant - 0.5 * ((y**2).sum(axis=0) - np.einsum("npk,pk->nk", mean, A.T @ y))
         rest = np.array([prediction.log_rest(law_error.of_rest(share)) for prediction in predictions])
-        found.append(gaussian - 0.5 * np.linalg.slogdet(precision)[1][:, None] + prior[:, None] + np.log(p_share) + rest)
+        log_p = prior + np.log(p_share) - 0.5 * np.linalg.slogdet(precision)[1]
+        found.append(gaussian + log_p[:, None] + rest)
         means.append(mean)
         variances.append(V)
     log_z, u, cov = np.concatenate(found), np.concatenate(means), np.concatenate(variances)

@@ -11,8 +11,8 @@ import numpy as np
 
 from .hypothesis import Array
 
-# Share of what faults alone leave that the true cause may leave, and how likely that is. The law is as likely as not the
-# library's; one of another form leaves any of these.
+# Share of what faults alone leave that the true cause may leave, and how likely that is. A law is as likely as not the
+# library's own; one of another form leaves any of these.
 SHARES = {0.0: 0.5, 0.003: 0.125, 0.01: 0.125, 0.03: 0.125, 0.1: 0.125}
 NO_SHARE = {0.0: 1.0}
 

@@ -38,14 +38,13 @@ def weigh_sets(
     the set that leads then.
     """
     search.say("probabilities of what was tried")
-    problem = ActuatorProblem(search.plant)
     after = search.at_minimum(after)
     fitted = [before, after, *_fit_subsets(search, after), *_fit_to_all(search, after), *others]
     while True:
         models = _choose_standing(search, fitted)
-        found = [_entrant(search, m) for m in models]
-        outcome = Contest(problem, found, _whitening(problem, search.noise), RECORDS, search.say).run(found)
-        first = {(e.names, e.parameters): m for m, e in reversed([*zip(models, found, strict=True)])}
+        outcome = weigh(search, models)
+        entrants = [_entrant(search, m) for m in models]
+        first = {(e.names, e.parameters): m for m, e in reversed([*zip(models, entrants, strict=True)])}
         ranked = [first[w.entrant.names, w.entrant.parameters] for w in outcome.weighed]
         leader = ranked[0]
         smaller = _fit_subsets(search, leader, models)
@@ -53,6 +52,13 @@ def weigh_sets(
             return outcome, ranked
         search.say(f"what is in {' + '.join(leader.names)}, which leads")
         fitted += smaller
+
+
+def weigh(search: Search, models: Sequence[Model]) -> Outcome:
+    """Probabilities of the models' sets of effects, and sizes; the first model is faults alone."""
+    problem = ActuatorProblem(search.plant)
+    entrants = [_entrant(search, m) for m in models]
+    return Contest(problem, entrants, _whitening(problem, search.noise), RECORDS, search.say).run(entrants)
 
 
 def probabilities(outcome: Outcome, model: Model, effect: str, *rivals: str) -> list[float]:
