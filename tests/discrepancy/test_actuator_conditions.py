@@ -180,10 +180,10 @@ def test_zeros_are_told_apart_beside_a_resolver_that_wobbles(hidden, shipped_pla
     assert zero_apart(shipped_plant, prepared(shipped_plant, made).signals) == pytest.approx(4e-5, abs=5e-7)
 
 
-def test_sound_sensors_and_a_gear_that_gives_have_no_zeros_apart(hidden, shipped_plant, cycles):
+def test_sound_sensors_have_no_zeros_apart_and_a_gear_that_gives_leaves_that_open(hidden, shipped_plant, cycles):
     assert zero_apart(shipped_plant, prepared(shipped_plant, cycles).signals) == 0.0
     soft = hidden.cycles(hidden.Flaws(compliance=2e-5, user_damping=10.0, load=4.0), 2, 13)
-    assert zero_apart(shipped_plant, prepared(shipped_plant, soft).signals) == 0.0
+    assert zero_apart(shipped_plant, prepared(shipped_plant, soft).signals) is None
 
 
 @pytest.mark.slow

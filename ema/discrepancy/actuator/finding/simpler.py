@@ -130,7 +130,7 @@ def take_resolver_zero(search: Search, model: Model, v: Verdict, alike: list[tup
 
     What lies within a step of the user's sensor needs no cause.
     """
-    zero = search.plant.data.zero
+    zero = search.plant.data.zero or 0.0
     if not v.is_noise or "commutation_offset" in model.names or abs(zero) < search.plant.plant.sensors.lvdt_step:
         return model, v
     c = resolver_zero(search.plant.plant, zero)

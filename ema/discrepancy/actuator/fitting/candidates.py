@@ -283,7 +283,7 @@ def candidates(
         if look.needs in shown and effect.name not in delays
     ]
     found += [Seen(**vars(replace(_plain(name, "time"), steps=(late,)))) for name, late in delays.items()]
-    found += [_commutation(plant, data.zero), _without_filter()]
+    found += [_commutation(plant, data.zero or 0.0), _without_filter()]
     top = max(float(np.abs(s.i).max()) for s in data.signals)
     if np.isinf(data.ranges).all() and any(int((np.abs(s.i) > top - FLAT).sum()) >= FLAT_SAMPLES for s in data.signals):
         limit = Free("adc_saturation.limit", 0.5 * top, plant.sensors.adc_range, CLIPPED_STEP)

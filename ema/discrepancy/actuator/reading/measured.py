@@ -46,8 +46,8 @@ class Measured:
         Resolution of the recorded rotor angle, 0 if finer than can be seen. [rad]
     angle_noise : float
         White noise of the recorded rotor angle, 0 if less than its motion hides. [rad rms]
-    zero : float
-        θ_m/GR less θ_u in the middle of the play, 0 if not clear. [rad]
+    zero : float, optional
+        θ_m/GR less θ_u in the middle of the play, None where the record leaves it open. [rad]
     every : int
         Samples from one recorded position to the next, where the record holds straight lines between them; else 1.
     faults : array, shape (n_cycles, 6)
@@ -70,7 +70,7 @@ class Measured:
     has_temperature: bool
     angle_step: float
     angle_noise: float
-    zero: float
+    zero: float | None
     every: int
     faults: Array
     ranges: Array

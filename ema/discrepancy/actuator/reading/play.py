@@ -68,7 +68,7 @@ def find_pressing_load(plant: Actuator, data: Measured) -> Pressed | None:
     g = plant.transmission
     m = spacing(GROUPS["gap"][0], plant.control.rate, len(data.signals[0].theta_u[0]))
     shafts = [np.ascontiguousarray(s.theta_m[0] / g.GR) for s in data.signals]
-    starts = (data.start[:, 0] + data.zero).tolist()
+    starts = (data.start[:, 0] + (data.zero or 0.0)).tolist()
     gaps = [_level(local_mean(shaft - s.theta_u[0], m)) for shaft, s in zip(shafts, data.signals, strict=True)]
 
     def left(by: Pressed) -> float:

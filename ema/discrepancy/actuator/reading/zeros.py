@@ -25,17 +25,18 @@ MOVING = 2.0  # [rad/s]
 DIFFERENCE = 20  # samples over which the speed is taken
 
 
-def zero_apart(plant: Actuator, signals: Sequence[Signals]) -> float:
-    """θ_m/GR less θ_u in the middle of the play; 0 if not clear of 0, or if a gear that gives leaves it open. [rad]
+def zero_apart(plant: Actuator, signals: Sequence[Signals]) -> float | None:
+    """θ_m/GR less θ_u in the middle of the play, 0 if not clear of 0; None where the record leaves it open. [rad]
 
-    Beside a resolver that wobbles it is the mean over a turn; 0 where the rotor turns too little to tell them apart.
+    A gear that gives and a late sensor leave it open. Beside a resolver that wobbles it is the mean over a turn, and
+    open where the rotor turns too little to tell them apart.
     """
     theta_m = np.concatenate([s.theta_m[0] for s in signals])
     d = theta_m / plant.transmission.GR - np.concatenate([s.theta_u[0] for s in signals])
     way = np.concatenate([_way(s.theta_m[0], plant.control.rate) for s in signals])
     sides = np.stack([way > CLOSED, way < -CLOSED]).astype(float)
     if sides.sum(axis=1).min() < ENOUGH:
-        return 0.0
+        return None
     closed = sides.any(axis=0)
     d, theta_m, sides = d[closed], theta_m[closed], sides[:, closed]
     stated = float(np.hypot(plant.sensors.lvdt_noise, plant.sensors.lvdt_step / np.sqrt(12.0)))
@@ -45,7 +46,7 @@ def zero_apart(plant: Actuator, signals: Sequence[Signals]) -> float:
         middle, known, varies = _middle(terms.T, d)
         if varies < STIFF * noise and known * noise < SEEN:
             return middle if abs(middle) > SEEN else 0.0
-    return 0.0
+    return None
 
 
 def _middle(terms: Array, d: Array) -> tuple[float, float, float]:

@@ -129,7 +129,7 @@ class EmaPlant:
     def _simulate(self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], dt: float) -> Runs:
         d = self.data
         zero_error = self._zero_error(points)
-        zero = d.zero - zero_error / self.plant.transmission.GR  # of the user's sensor, if the rotor's is off by that
+        zero = self._zero_of_user(zero_error)
         command = np.array([d.commands[d.motion[c]] for c in cycles]) + zero[:, None]
         recorded = command if d.every == 1 else np.array([d.signals[c].theta_cmd[0] for c in cycles]) + zero[:, None]
         cycles_ = np.asarray(cycles)
@@ -242,6 +242,15 @@ class EmaPlant:
         late = np.array([p.get(name, self.neutral(name)) for p in points]) > 0.0
         switching = late & (np.abs(holding).max(axis=1) > CARRIED)
         return np.where(switching[:, None] & (holding < 0.0), -1.0, 1.0)
+
+    def _zero_of_user(self, zero_error: Array) -> Array:
+        """What the user's sensor reads too little if the rotor's is off by `zero_error`, for each run. [rad]
+
+        Both together are what the record shows to lie between them. Where that is open, the user's sensor is right.
+        """
+        if self.data.zero is None:
+            return np.zeros_like(zero_error)
+        return self.data.zero - zero_error / self.plant.transmission.GR
 
     def _zero_error(self, points: Sequence[Point]) -> Array:
         """By how much the zero of the recorded rotor angle is off, for each run. [rad]"""
