@@ -75,7 +75,7 @@ def test_noise_of_a_motion_does_not_depend_on_others(shipped_plant, data):
 
 def test_memory_keeps_no_more_than_it_may_and_forgets_the_longest_unused():
     memory = Memory(2)
-    runs = [Asked(frozenset(), 0, seed, 1e-6, 0) for seed in range(3)]
+    runs = [Asked(frozenset(), 0, seed, 1e-6, 0, None) for seed in range(3)]
     made = Runs(np.arange(3.0)[:, None], np.arange(3.0)[:, None])
     memory.keep(runs[:2], Runs(made.features[:2], made.envelopes[:2]))
     memory.recall([runs[0]])

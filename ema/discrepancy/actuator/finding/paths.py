@@ -11,6 +11,7 @@ from ema.discrepancy.actuator.fitting.growing import is_steady
 from ema.discrepancy.actuator.fitting.model import CHANCE, DISTANT, Model
 from ema.discrepancy.actuator.fitting.search import Search, start_model
 from ema.discrepancy.actuator.fitting.timing import find_samples_late
+from ema.discrepancy.actuator.fitting.zeros import take_zero
 from ema.discrepancy.actuator.simulating.noise import Noise, Verdict
 from ema.discrepancy.actuator.simulating.plant import EmaPlant
 from ema.discrepancy.plant import Point
@@ -24,6 +25,8 @@ from .verdicts import FAULT_ALARM, NEARLY, judge_closely, take_bench_conditions
 class Path:
     """One way through the search: with what noise, step of the comparators and command, from where to where.
 
+    The `zero` is by how much those of rotor and user are taken to lie apart. [rad]
+
     `alike` holds, for each effect of `after`, what does as well in its place, `as_well` the effects that would explain
     as well what several of its faults have in common.
     """
@@ -31,6 +34,7 @@ class Path:
     noise: Noise
     step: float | None
     late: int
+    zero: float | None
     tried: list[Model]
     before: Model
     verdict_before: Verdict
@@ -44,7 +48,9 @@ class Path:
         """The beginning, where nothing is explained yet."""
         v = search.verdict(model)
         plant = search.plant
-        return cls(search.noise, plant.step, plant.late, list(search.tried), model, v, model, v, [], [])
+        return cls(
+            search.noise, plant.step, plant.late, plant.data.zero, list(search.tried), model, v, model, v, [], []
+        )
 
 
 def begin_with_faults(search: Search, of_each: Array, point: Point) -> Search:
@@ -52,7 +58,7 @@ def begin_with_faults(search: Search, of_each: Array, point: Point) -> Search:
     mean = of_each.mean(axis=0)
     old = search.plant
     plant = EmaPlant(old.plant, replace(old.data, faults=of_each - mean), old.n_threads, old.resonance)
-    plant.late, plant.work = old.late, old.work
+    plant.late, plant.work, plant.leaves_zero_open = old.late, old.work, old.leaves_zero_open
     take_step(plant, old.step)
     noise = Noise(plant, {**point, **dict(zip(FAULTS, mean.tolist(), strict=True))})
     return Search(plant, noise, search.train, search.heldout, search.say)
@@ -130,6 +136,7 @@ def resume(search: Search, path: Path) -> None:
     search.noise, search.tried = path.noise, list(path.tried)
     take_step(search.plant, path.step)
     search.plant.late = path.late
+    take_zero(search.plant, path.zero)
 
 
 def put_one_in_place_of_faults(
@@ -175,4 +182,5 @@ def _go(search: Search, begun: Path) -> Path:
     if verdict_before.is_noise:
         after, v = simplify(search, before, after, v, alike, as_well)
     plant = search.plant
-    return Path(search.noise, plant.step, plant.late, search.tried, before, verdict_before, after, v, alike, as_well)
+    conditions = plant.step, plant.late, plant.data.zero
+    return Path(search.noise, *conditions, search.tried, before, verdict_before, after, v, alike, as_well)

@@ -23,6 +23,7 @@ from ema.discrepancy.actuator.fitting.comparators import (
 from ema.discrepancy.actuator.fitting.model import CHANCE, DISTANT, Model
 from ema.discrepancy.actuator.fitting.problem import cost_of
 from ema.discrepancy.actuator.fitting.timing import find_samples_late
+from ema.discrepancy.actuator.fitting.zeros import find_zero, take_zero
 from ema.discrepancy.actuator.simulating.noise import N_RUNS, N_RUNS_SURE, Noise, Verdict
 
 from .weighing import is_credible
@@ -45,7 +46,10 @@ def judge_closely(search: Search, model: Model, v: Verdict) -> tuple[Model, Verd
 
 
 def take_bench_conditions(search: Search, model: Model, v: Verdict, share: float = CLEAR) -> tuple[Model, Verdict]:
-    """`model` with the command and the grid of the comparators that the record seems to have, if others than ours."""
+    """`model` with the zeros, command and grid of comparators that the record seems to have, if others than ours."""
+    model, v = _take_zeros(search, model, v)
+    if v.is_noise:
+        return model, v
     late = find_samples_late(search.plant, search.noise, model.fit.point, search.train)
     if late:
         search.plant.late = late
@@ -58,6 +62,21 @@ def take_bench_conditions(search: Search, model: Model, v: Verdict, share: float
     if step is None:
         return model, v
     return _by_step(search, model, step, N_RUNS_SURE)
+
+
+def _take_zeros(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
+    """`model` with the zeros of rotor and user as far apart as it leaves them, where that leaves less."""
+    zero, taken = find_zero(search.plant, model.fit.point, search.train), search.plant.data.zero
+    if zero is None:
+        return model, v
+    take_zero(search.plant, zero)
+    made = search.model(model.effects, model.fit.free, model.fit.point, None, 3)
+    if made.excess >= model.excess:
+        take_zero(search.plant, taken)
+        return model, v
+    v = search.verdict(made)
+    search.say(f"zeros of rotor and user {zero:+.2g} rad apart: p = {v.p_value:.2g}")
+    return made, v
 
 
 def settle_at_minimum(search: Search, model: Model, v: Verdict, alike: list[tuple[str, ...]]) -> tuple[Model, Verdict]:

@@ -57,6 +57,7 @@ class EmaPlant:
         self.steps: tuple[float, ...] = STEPS
         self.noise_steps: tuple[float, ...] = NOISE_STEPS
         self.late = 0  # samples by which the recorded command is late against the other channels
+        self.leaves_zero_open = data.zero is None
         self.n_motions = len(data.commands)
         of_motion = [np.flatnonzero(data.motion == m) for m in range(self.n_motions)]
         # Cycles with which columns are simulated: the first of each motion, or where temperature differs the farthest.
@@ -96,7 +97,7 @@ class EmaPlant:
         steps = steps or self.steps
         named = {id(point): self._not_neutral(point) for point in points}
         asked = [
-            Asked(named[id(point)], cycle, seed, steps[(seed - seeds[0]) % len(steps)], self.late)
+            Asked(named[id(point)], cycle, seed, steps[(seed - seeds[0]) % len(steps)], self.late, self.data.zero)
             for point, cycle, seed in zip(points, cycles, seeds, strict=True)
         ]
         new = sorted(self.memory.unknown(asked), key=lambda run: run.alike)
@@ -127,8 +128,18 @@ class EmaPlant:
         return self._simulate(points, [run.cycle for run in runs], [run.seed for run in runs], runs[0].dt)
 
     def _simulate(self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], dt: float) -> Runs:
+        signals, envelope = self.signals(points, cycles, seeds, dt)
+        return Runs(stacked(features(self.plant, signals)), envelope[:, ::ENVELOPE_STEP])
+
+    def signals(
+        self, points: Sequence[Point], cycles: Sequence[int], seeds: Sequence[int], dt: float
+    ) -> tuple[Signals, Array]:
+        """What is recorded in runs of as many points, cycles and seeds, and the envelopes (n, n_times). [A]
+
+        The angle of the user, and the command with it, are free of what its sensor's zero is off by.
+        """
         d = self.data
-        zero_error = self._zero_error(points)
+        zero_error = self.zero_error(points)
         zero = self._zero_of_user(zero_error)
         command = np.array([d.commands[d.motion[c]] for c in cycles]) + zero[:, None]
         recorded = command if d.every == 1 else np.array([d.signals[c].theta_cmd[0] for c in cycles]) + zero[:, None]
@@ -167,8 +178,7 @@ class EmaPlant:
             theta_m = d.angle_step * np.round(theta_m / d.angle_step)
         u_dc = r.u_dc if d.signals[cycles[0]].u_dc is not None else None
         theta_m, theta_u = (straighten(x, d.every) for x in (theta_m, r.theta_u))
-        signals = Signals(r.i, theta_m, theta_u, recorded, u_dc)
-        return Runs(stacked(features(self.plant, signals)), r.envelope[:, ::ENVELOPE_STEP])
+        return Signals(r.i, theta_m, theta_u, recorded, u_dc), r.envelope
 
     def repeated(
         self, points: Sequence[Point], cycles: Sequence[int], n_seeds: int, seed: int, steps: Steps = None
@@ -252,7 +262,7 @@ class EmaPlant:
             return np.zeros_like(zero_error)
         return self.data.zero - zero_error / self.plant.transmission.GR
 
-    def _zero_error(self, points: Sequence[Point]) -> Array:
+    def zero_error(self, points: Sequence[Point]) -> Array:
         """By how much the zero of the recorded rotor angle is off, for each run. [rad]"""
         angle, apart = (
             np.array([p.get(name, self.neutral(name)) for p in points])

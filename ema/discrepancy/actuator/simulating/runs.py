@@ -27,6 +27,8 @@ class Asked(NamedTuple):
         Integration step. [s]
     late : int
         Samples by which the command is late.
+    zero : float, optional
+        By how much the zeros of rotor and user are taken to lie apart. [rad]
     """
 
     point: frozenset[tuple[str, float]]
@@ -34,6 +36,7 @@ class Asked(NamedTuple):
     seed: int
     dt: float
     late: int
+    zero: float | None
 
     @property
     def alike(self) -> tuple[float, int, bool, int]:
