@@ -65,13 +65,13 @@ def take_bench_conditions(search: Search, model: Model, v: Verdict, share: float
 
 
 def _take_zeros(search: Search, model: Model, v: Verdict) -> tuple[Model, Verdict]:
-    """`model` with the zeros of rotor and user as far apart as it leaves them, where that leaves less."""
+    """`model` with the zeros of rotor and user as far apart as it leaves them, unless that leaves more."""
     zero, taken = find_zero(search.plant, model.fit.point, search.train), search.plant.data.zero
     if zero is None:
         return model, v
     take_zero(search.plant, zero)
     made = search.model(model.effects, model.fit.free, model.fit.point, None, 3)
-    if made.excess >= model.excess:
+    if made.excess > model.excess:
         take_zero(search.plant, taken)
         return model, v
     v = search.verdict(made)
@@ -86,6 +86,7 @@ def settle_at_minimum(search: Search, model: Model, v: Verdict, alike: list[tupl
     """
     if not model.effects or model.excess > DISTANT or search.is_settled(model):
         return model, v
+    model, v = _take_zeros(search, model, v)
     model, v = _at_the_minimum(search, *_by_its_own_step(search, *begin_again(search, model, v), alike))
     search.minima.append((model.fit, search.noise))
     return model, v

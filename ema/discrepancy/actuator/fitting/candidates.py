@@ -215,6 +215,11 @@ class Commutation(Candidate):
     recorded: float = 0.0
 
     @property
+    def key(self) -> str:
+        """Distinct for zeros that lie otherwise apart: what the recorded angle is off by is taken for the user's."""
+        return f"{super().key} {self.recorded:.4g}"
+
+    @property
     def is_seen(self) -> bool:
         """Whether the zeros show it: then it is off by that, or it is the user's zero, which only a fit tells."""
         return bool(self.shown)

@@ -63,7 +63,8 @@ REST = 0.1  # [N m] what is left of a cycle's torque balance, root of the sum of
 class Resonance(NamedTuple):
     """Start values of the effect `gear_compliance`, in its units; and what comes with them.
 
-    `k2` is the fault beside it, `starts` are θ_u and ω_u at the start of each cycle, shape (n_cycles, 2). [rad, rad/s]
+    `k2` is the fault beside it, `starts` are θ_u as it is read and ω_u at the start of each cycle, shape (n_cycles, 2).
+    [rad, rad/s]
     """
 
     compliance: float
@@ -116,6 +117,20 @@ class Gear(NamedTuple):
         return self.w_0 < FREQUENCIES[-1] and self.zeta + 0.5 * self.drag / self.w_0 < RINGS
 
 
+class Found(NamedTuple):
+    """A gear as θ_u tells it.
+
+    `starts` are θ_u and ω_u at the start of each cycle, shape (n_cycles, 2), by the zero of the rotor. The user's
+    sensor may have another, and a load bends the gear: by what θ_u is `off` in the mean of each cycle, it does not
+    swing. `left` is the sum of variances of θ_u about it.
+    """
+
+    gear: Gear
+    starts: Array
+    off: Array
+    left: float
+
+
 @njit(cache=True, nogil=True)
 def _user(shaft: Array, start: Array, gear: Gear, T: float) -> Array:
     """θ_u of a user behind a spring, driven by θ_m/GR; `start`: its θ_u and ω_u. [rad]"""
@@ -159,15 +174,15 @@ def find_resonance(plant: Actuator, data: Measured) -> Resonance | None:
     stiff = sum(float(np.var(user - shaft)) for shaft, user in zip(shafts[:n], users, strict=False))
     as_noise = n * (LOUD * max(roughness(user) for user in users)) ** 2
     found = _gear(plant, shafts, users, data, NONE, CLEAR * stiff)
-    left = stiff if found is None else found[2]
+    left = stiff if found is None else found.left
     starts = data.start[:n, 0].tolist()
     held = min(_left_by_play(shafts, users, starts, b) for b in backlash(plant.transmission.b, PLAYS).tolist())
     if min(left, held) > as_noise:
         tried = (_gear(plant, shafts, users, data, c, CLEARER * min(left, held)) for c in BESIDE)
-        found = min((g for g in tried if g is not None), key=lambda g: g[2], default=found)
+        found = min((g for g in tried if g is not None), key=lambda g: g.left, default=found)
     if found is None:
         return None
-    gear, starts, _ = found
+    gear, starts, off, _ = found
     swinging = [_user(s, start, gear, T) for s, start in zip(shafts, starts, strict=True)]
     inertia = _inertia(plant, data, swinging, sprung=gear.spring > 0.0)
     nominal = plant.transmission.b
@@ -179,7 +194,7 @@ def find_resonance(plant: Actuator, data: Measured) -> Resonance | None:
         gear.drag * inertia,
         gear.friction * inertia,
         float(np.clip(k2, 0.0, 1.0)),
-        starts,
+        np.stack([starts[:, 0] + off, starts[:, 1]], axis=1),
     )
 
 
@@ -196,13 +211,14 @@ def _gear(
     data: Measured,
     beside: Beside,
     least: float,
-) -> tuple[Gear, Array, float] | None:
-    """A gear and the starts of its user (n_cycles, 2), which leave that much of θ_u, begun with what is `beside` it.
+) -> Found | None:
+    """A gear and the starts of its user, begun with what is `beside` it.
 
-    None where more than `least` is left, or what is left needs no resonance.
+    None where more than `least` is left of θ_u, or what is left needs no resonance.
     """
     T = 1.0 / plant.control.rate
-    starts = np.stack([data.start[:, 0], data.user_speed], axis=1)
+    off = np.array([np.mean(user - shaft) for shaft, user in zip(shafts, users, strict=True)])
+    starts = np.stack([data.start[:, 0] - off, data.user_speed], axis=1)
     free = np.flatnonzero([1.0, 1.0, 1.0, *beside])
 
     def gear(x: Array) -> Gear:
@@ -230,8 +246,10 @@ def _gear(
         best, left = gear(found.x), float(found.fun)
         if left > least:
             return None
-        starts = np.array([_fit_start(*of, best, T) for of in zip(shafts, users, starts, strict=True)])
-    return None if beside != NONE and not best.rings else (best, starts, left)
+        cycles = list(zip(shafts, users, starts, strict=True))
+        off = np.array([np.mean(user - _read(shaft, start, best, T)) for shaft, user, start in cycles])
+        starts = np.array([_fit_start(s, user - x, at, best, T) for (s, user, at), x in zip(cycles, off, strict=True)])
+    return None if beside != NONE and not best.rings else Found(best, starts, off, left)
 
 
 def _fit_start(shaft: Array, user: Array, start: Array, gear: Gear, T: float) -> Array:
