@@ -40,11 +40,13 @@ def fitted(effects, point, heldout=1.0, frees=None, sd=None):
 class Search:
     """Fits leave what `leaves` says of them; nothing is simulated."""
 
-    def __init__(self, leaves=lambda model: 1.0, zero=0.0, verdict=NOISE, tried=(), at_minimum=lambda model: model):
+    def __init__(
+        self, leaves=lambda model: 1.0, zero=0.0, is_open=False, verdict=NOISE, tried=(), at_minimum=lambda model: model
+    ):
         sensors = SimpleNamespace(lvdt_step=1e-6)
         motor, gear = SimpleNamespace(p=2), SimpleNamespace(GR=500.0)
         plant = SimpleNamespace(sensors=sensors, motor=motor, transmission=gear)
-        self.plant = SimpleNamespace(plant=plant, data=SimpleNamespace(zero=zero))
+        self.plant = SimpleNamespace(plant=plant, data=SimpleNamespace(zero=zero), leaves_zero_open=is_open)
         self.leaves, self.noise, self._verdict, self.made, self.tried = leaves, None, verdict, [], list(tried)
         self.at_minimum = at_minimum
 
@@ -142,6 +144,14 @@ def test_a_zero_of_two_sensors_may_be_the_commutation():
     better, alike = Search(lambda m: 1.0 if m.names else 1.3, zero=1e-4), []
     take_resolver_zero(better, model, NOISE, alike)
     assert alike == [()]  # nothing else would do
+
+
+@pytest.mark.parametrize(("is_open", "known"), [(False, 3e-7), (True, 2e-6)])
+def test_a_zero_that_a_model_told_is_known_less_well_than_one_that_the_record_shows(is_open, known):
+    """Held within 0.3 mrad electrical a commutation was told 9 deviations off, since the model's zero was 0.9 off."""
+    found, _ = take_resolver_zero(Search(zero=1e-4, is_open=is_open), fitted((), {}), NOISE, [])
+    (angle,) = (f for f in found.fit.free if f.name == "commutation_offset.angle")
+    assert (angle.low, angle.high) == pytest.approx((1e3 * (1e-4 - known), 1e3 * (1e-4 + known)))
 
 
 def test_a_zero_within_a_step_of_the_sensor_needs_no_cause():

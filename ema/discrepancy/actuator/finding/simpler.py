@@ -13,6 +13,7 @@ from ema.core.names import FAULTS
 from ema.discrepancy.actuator.fitting.candidates import Candidate, Way, candidates, resolver_zero
 from ema.discrepancy.actuator.fitting.free import Free
 from ema.discrepancy.actuator.fitting.model import CHANCE, K_SEEN, NEAR, Model, strip
+from ema.discrepancy.actuator.reading.zeros import SEEN
 from ema.discrepancy.actuator.simulating.noise import Noise, Verdict
 from ema.discrepancy.plant import Point
 from ema.effects import registry
@@ -133,7 +134,8 @@ def take_resolver_zero(search: Search, model: Model, v: Verdict, alike: list[tup
     zero = search.plant.data.zero or 0.0
     if not v.is_noise or "commutation_offset" in model.names or abs(zero) < search.plant.plant.sensors.lvdt_step:
         return model, v
-    c = resolver_zero(search.plant.plant, zero)
+    told = (SEEN,) if search.plant.leaves_zero_open else ()  # by a model, which is told no finer
+    c = resolver_zero(search.plant.plant, zero, *told)
     made = search.model((*model.effects, c), (*model.fit.free, *c.frees), {**model.fit.point, **c.probes()[0]}, None, 2)
     w = search.verdict(made)
     more = search.left_more(made, model, (search.noise,))

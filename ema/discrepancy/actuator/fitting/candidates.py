@@ -246,9 +246,9 @@ def _electrical(plant: Actuator, zero: float) -> float:
     return plant.motor.p * plant.transmission.GR * zero
 
 
-def resolver_zero(plant: Actuator, zero: float) -> Candidate:
-    """A commutation that is off by as much as the rotor's zero, if that is what lies apart by `zero`. [rad]"""
-    angle, reach = _electrical(plant, zero), _electrical(plant, ZERO_KNOWN)
+def resolver_zero(plant: Actuator, zero: float, known: float = ZERO_KNOWN) -> Candidate:
+    """A commutation that is off by the rotor's zero, if that lies apart by `zero`, give or take `known`. [rad]"""
+    angle, reach = _electrical(plant, zero), _electrical(plant, known)
     frees = (Free("commutation_offset.angle", angle - reach, angle + reach, reach),)
     return Candidate("commutation_offset", frees, {}, ("angle",), (angle,))
 
