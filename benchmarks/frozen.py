@@ -94,6 +94,21 @@ def with_block(page: str, name: str, text: str) -> str:
 
 def run(out: Path, of: Mapping[str, int], trial: Callable[[str, int, int], dict[str, Any]]) -> None:
     """Run the trials of this commit that are missing, one line each, and print the table."""
+
+    def told(row: dict[str, Any]) -> str:
+        hidden = f"{row['stratum']} {row['number']} ({row['case']}, {row['plant']})"
+        return f"{hidden}: {row['outcome']} {row.get('named')}"
+
+    click.echo(table(run_missing(out, of, trial, told)))
+
+
+def run_missing(
+    out: Path,
+    of: Mapping[str, int],
+    trial: Callable[[str, int, int], dict[str, Any]],
+    told: Callable[[dict[str, Any]], str],
+) -> list[dict[str, Any]]:
+    """Rows of this commit's trials: those that are missing are run, and each is told and a line of the file."""
     found, here = begun(out)
     for stratum, number in missing(of, found):
         s = seed(here, stratum, number)
@@ -101,9 +116,8 @@ def run(out: Path, of: Mapping[str, int], trial: Callable[[str, int, int], dict[
         found.append(row)
         with out.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
-        told = f"{stratum} {number} ({row['case']}, {row['plant']}): {row['outcome']} {row.get('named')}"
-        click.echo(told, err=True)
-    click.echo(table(found))
+        click.echo(told(row), err=True)
+    return found
 
 
 def command(main: Callable[..., None]) -> click.Command:

@@ -9,7 +9,6 @@ Prints the share of sizes within intervals of 50, 90 and 95 %, as the score has 
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from ema.discrepancy.progress import Progress
 
 from . import strata
 from .discrepancy import recorded
-from .frozen import begun, bench_seed, missing, seed
+from .frozen import bench_seed, run_missing
 from .frozen_table import coverage
 
 STRATA = ("one effect", "beside faults")
@@ -76,14 +75,10 @@ def table(rows: list[dict[str, Any]]) -> str:
 @click.option("--out", type=click.Path(path_type=Path), default=Path("var/sizes.jsonl"), show_default=True)
 def main(trials: int, out: Path) -> None:
     """Run the trials of this commit that are missing, and print the table."""
-    rows, here = begun(out)
-    for stratum, number in missing(dict.fromkeys(STRATA, trials // len(STRATA)), rows):
-        s = seed(here, stratum, number)
-        row = {"commit": here, "stratum": stratum, "number": number, "seed": s, "z": deviations(stratum, number, s)}
-        rows.append(row)
-        with out.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
-        click.echo(f"{stratum} {number}: {row['z']}", err=True)
+    of = dict.fromkeys(STRATA, trials // len(STRATA))
+    rows = run_missing(
+        out, of, lambda *of: {"z": deviations(*of)}, lambda row: f"{row['stratum']} {row['number']}: {row['z']}"
+    )
     click.echo(table(rows))
 
 

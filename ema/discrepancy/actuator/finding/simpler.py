@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.names import FAULTS
-from ema.discrepancy.actuator.fitting.candidates import Candidate, Way, candidates, resolver_zero
+from ema.discrepancy.actuator.fitting.candidates import ZERO_KNOWN, Candidate, Way, candidates, resolver_zero
 from ema.discrepancy.actuator.fitting.free import Free
 from ema.discrepancy.actuator.fitting.model import CHANCE, K_SEEN, NEAR, Model, strip
 from ema.discrepancy.actuator.reading.zeros import SEEN
@@ -134,8 +134,8 @@ def take_resolver_zero(search: Search, model: Model, v: Verdict, alike: list[tup
     zero = search.plant.data.zero or 0.0
     if not v.is_noise or "commutation_offset" in model.names or abs(zero) < search.plant.plant.sensors.lvdt_step:
         return model, v
-    told = (SEEN,) if search.plant.leaves_zero_open else ()  # by a model, which is told no finer
-    c = resolver_zero(search.plant.plant, zero, *told)
+    known = SEEN if search.plant.leaves_zero_open else ZERO_KNOWN  # a model tells it no finer
+    c = resolver_zero(search.plant.plant, zero, known)
     made = search.model((*model.effects, c), (*model.fit.free, *c.frees), {**model.fit.point, **c.probes()[0]}, None, 2)
     w = search.verdict(made)
     more = search.left_more(made, model, (search.noise,))

@@ -246,7 +246,7 @@ def _electrical(plant: Actuator, zero: float) -> float:
     return plant.motor.p * plant.transmission.GR * zero
 
 
-def resolver_zero(plant: Actuator, zero: float, known: float = ZERO_KNOWN) -> Candidate:
+def resolver_zero(plant: Actuator, zero: float, known: float) -> Candidate:
     """A commutation that is off by the rotor's zero, if that lies apart by `zero`, give or take `known`. [rad]"""
     angle, reach = _electrical(plant, zero), _electrical(plant, known)
     frees = (Free("commutation_offset.angle", angle - reach, angle + reach, reach),)
