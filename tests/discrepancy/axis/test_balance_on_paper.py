@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -19,6 +20,7 @@ from ema.discrepancy.axis.balance.laws.units import LINEAR, ROTARY, of_base
 from ema.discrepancy.axis.balance.records.course import Course
 from ema.discrepancy.axis.balance.records.sampled import join
 from ema.discrepancy.axis.balance.records.widths import half_widths
+from ema.discrepancy.axis.balance.regressing import choice
 from ema.discrepancy.axis.balance.regressing.apart import apart, by_record
 from ema.discrepancy.axis.balance.regressing.choice import choose_laws
 from ema.discrepancy.axis.balance.regressing.found import Balance
@@ -81,6 +83,18 @@ def test_nothing_is_chosen_where_nothing_acts_and_a_drag_where_one_does():
     (term,) = choose_laws(rows(m, torque=2e-3 * m.w * np.abs(m.w), noise=0.01), PLAIN, every).terms
     assert term.law.key == "quadratic drag"
     assert term.wins > 0.95
+
+
+def test_a_choice_whose_tests_go_round_ends_with_what_leaves_least(monkeypatch):
+    """Four records of a real motor that only ran up made one choice go round for ever; here its revisions do."""
+    m = motion()
+    made = rows(m, torque=2e-3 * m.w * np.abs(m.w), noise=0.01)
+    every = [law for law in laws(m, linear=False) if law.key in ("constant", "spring", "quadratic drag")]
+    wrong = [regress(made, PLAIN, [law]) for law in every if law.key != "quadratic drag"]
+    revised = itertools.cycle(wrong)
+    monkeypatch.setattr(choice, "_revise", lambda *_: next(revised))
+    (term,) = choose_laws(made, PLAIN, every).terms
+    assert term.law.key == min(wrong, key=lambda r: r.loss).laws[0].key
 
 
 @pytest.mark.parametrize("between", [0.0, 0.25, 0.5])

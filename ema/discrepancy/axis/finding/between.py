@@ -43,8 +43,10 @@ def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
     progress = progress or Progress()
     if all(w.static for w in plant.windows):
         return examine(plant, progress)
+    progress("the balance along the measured motion")
+    is_linked = plant.is_linked
     progress("the drive between samples")
-    if plant.is_linked:
+    if is_linked:
         plant.between = _of_balance(plant)
         return _say_way(plant, examine(plant, progress))
     plant.between = _of_plain(plant)

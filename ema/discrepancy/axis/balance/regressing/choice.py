@@ -27,12 +27,17 @@ EQUAL = 1e-9  # share by which rounding tells two columns apart that are one on 
 
 
 def choose_laws(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence[Law] = ()) -> Balance:
-    """Forward and backward selection beside the laws that are `given`."""
+    """Forward and backward selection beside the laws that are `given`.
+
+    Each step is a test of two models, and such tests can go round: A by B, B by C, C by A. Of those that follow each
+    other in a circle the one that leaves least of held-out blocks is taken.
+    """
     n = int(found.whole.sum())
     drive = float(np.var(found.drive[found.whole]))
     asked = Asked.of(drive * n, every)
     base = regress(found, plain, given)
     model, declared = base, {law.key for law in given}
+    met = [model]
     while _n_laws(model) < MOST_LAWS:
         trials = _try_each(found, plain, model, [law for law in every if not _is_full(model, law)])
         # not the best of all alone: a share of the load itself takes much of any drive, and blocks disagree on it
@@ -40,6 +45,10 @@ def choose_laws(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence
         if best is None:
             break
         model = _revise(found, plain, best, every, asked)
+        if circle := _since(met, model):
+            model = min(circle, key=lambda r: r.loss)
+            break
+        met.append(model)
     for _ in range(2 * MOST_LAWS):
         fewer = _exchange(found, plain, model, every, asked)
         if fewer is None:
@@ -53,6 +62,13 @@ def choose_laws(found: Rows, plain: Plain, every: Sequence[Law], given: Sequence
         base.loss / n, model.loss / n, float(np.mean(found.sigma[found.whole] ** 2)),
         given=tuple(given),
     )  # fmt: skip
+
+
+def _since(met: Sequence[Regression], model: Regression) -> Sequence[Regression]:
+    """Those met since a model of the same laws, that one with them; none where there was none."""
+    sets = [{law.key for law in r.laws} for r in met]
+    own = {law.key for law in model.laws}
+    return met[sets.index(own) :] if own in sets else ()
 
 
 def _n_laws(model: Regression) -> int:
