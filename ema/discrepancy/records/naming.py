@@ -1,14 +1,16 @@
-"""What a stranger's titles probably mean: a proposal to be read by its owner, never a reading of the file by itself."""
+"""What a stranger's columns probably are: a proposal to be read by its owner, never a reading of the file by itself."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ema.core.names import CHANNELS
 from ema.core.table import Table
 from ema.core.table_records import titled
 from ema.core.units import convert
+
+from .shown import Shown
 
 _COMMAND = {
     "ref", "reference", "cmd", "command", "commanded", "target", "goal", "desired", "des", "set", "setpoint", "demand",
@@ -72,6 +74,9 @@ def propose(table: Table) -> list[Proposal]:
         what in ("current", "voltage", "duty") or (what in _BY_LOAD and not _is_of_load(title))
         for title, (what, _) in zip(table.header, seen, strict=True)
     )
+    shown = Shown(table)
+    currents = [k for k, (what, _) in enumerate(seen) if what == "current"]
+    reversing = currents + [k for k, (what, _) in enumerate(seen) if what in ("turning", "speed")]
     taken: dict[str, str] = {}
     found: dict[int, Proposal] = {}
     for index in sorted(range(len(seen)), key=lambda k: _is_commanded_drive(table.header[k], seen[k][0])):
@@ -79,13 +84,13 @@ def propose(table: Table) -> list[Proposal]:
         channel = _channel(title, what, is_linear and unit is None, is_actuator, has_duty)
         if has_drive and what in _BY_LOAD and _is_of_load(title):
             channel = _BY_LOAD[what]  # what the drive works against
-        if what == "force" and not is_linear:
-            lead = "{channel: load_torque, unit: N m, scale: 7.96e-4} where a screw leads by 5 mm"
-            found[index] = Proposal(title, None, None, f"a force on a rotary axis; of a load it would be {lead}")
-        elif channel is not None and (said := _of_its_own_scale(title, table.units.get(index), channel)):
-            found[index] = Proposal(title, None, None, said)
-        elif channel is None:
-            found[index] = Proposal(title, None, None, "no channel of an axis or an actuator by its title and unit")
+        if channel == "u_q" and shown.feeds(index, reversing):
+            channel = "u_dc"
+        why = _why_not(table, index, what, channel, is_linear) or _shown_not(table, shown, index, what, currents)
+        if channel is None or why is not None:
+            found[index] = Proposal(
+                title, None, None, why or "no channel of an axis or an actuator by its title and unit"
+            )
         elif channel in taken:
             said = f"looks like {channel} too, as '{taken[channel]}' does"
             if channel == "theta_m":
@@ -101,7 +106,32 @@ def propose(table: Table) -> list[Proposal]:
                 unread = f"[{own}] is no unit that is known" if own else "the file gives no unit"
                 said += f"; {unread}: is it {CHANNELS[channel].unit}?"
             found[index] = Proposal(title, channel, unit or CHANNELS[channel].unit, said)
-    return [found[index] for index in range(len(seen))]
+    both = {"torque", "i_q"} <= taken.keys()
+    return [_ask_whose(found[index]) if both else found[index] for index in range(len(seen))]
+
+
+def _why_not(table: Table, index: int, what: str | None, channel: str | None, is_linear: bool) -> str | None:
+    """Why a column is no channel as it is, and what to write instead; None where it may be one."""
+    if what == "force" and not is_linear:
+        lead = "{channel: load_torque, unit: N m, scale: 7.96e-4} where a screw leads by 5 mm"
+        return f"a force on a rotary axis; of a load it would be {lead}"
+    return None if channel is None else _of_its_own_scale(table.header[index], table.units.get(index), channel)
+
+
+def _shown_not(table: Table, shown: Shown, index: int, what: str | None, currents: list[int]) -> str | None:
+    """What its numbers show a column to be instead of what drives; None where they show nothing."""
+    if what in _DRIVES and shown.is_zero(index):
+        return "zero in all rows: it drives nothing"
+    if what in _BY_LOAD and (of := shown.ratio(index, currents)) is not None:
+        return f"{of[1]:.4g} times '{table.header[of[0]]}': computed from it, no measurement"
+    return None
+
+
+def _ask_whose(proposal: Proposal) -> Proposal:
+    """What to look at where a torque stands beside a drive's current."""
+    if proposal.channel != "torque":
+        return proposal
+    return replace(proposal, said=f"{proposal.said}: the drive's? What it works against would be load_torque")
 
 
 def _plain(title: str) -> str:
