@@ -30,41 +30,6 @@ def channels(answer):
     return {title: one if one == "ignore" else (one["channel"], one["unit"]) for title, one in columns.items()}
 
 
-def test_numbers_show_a_supply_and_a_torque_that_was_computed(tmp_path):
-    """As a drive logs them: the voltage of its bus, and a torque that is its current times a constant."""
-    t = 0.01 * np.arange(200)
-    current = np.sin(5.0 * t)
-    sensor = 0.3 * np.sin(5.0 * t) + 0.05 * np.cos(31.0 * t)
-    columns = {
-        "time [s]": t, "angle [rad]": np.cos(5.0 * t), "torque [Nm]": np.round(0.1095 * current, 4), "iq [A]": current,
-        "voltage [V]": 36.0 - 0.4 * np.abs(current), "axis 2 torque [Nm]": 0.0 * t, "sensor torque [Nm]": sensor,
-    }  # fmt: skip
-    path = tmp_path / "bench.csv"
-    np.savetxt(path, np.column_stack([*columns.values()]), delimiter=",", header=",".join(columns), comments="")
-    answer = CliRunner().invoke(cli, ["records", "map", str(path)], catch_exceptions=False)
-    assert channels(answer) == {
-        "time [s]": ("t", "s"), "angle [rad]": ("theta_m", "rad"), "torque [Nm]": "ignore", "iq [A]": ("i_q", "A"),
-        "voltage [V]": ("u_dc", "V"), "axis 2 torque [Nm]": "ignore", "sensor torque [Nm]": ("torque", "Nm"),
-    }  # fmt: skip
-    assert "0.1095 times 'iq [A]': computed from it, no measurement" in answer.stdout
-    assert "load_torque" in next(line for line in answer.stdout.splitlines() if "sensor" in line)
-
-
-def test_a_voltage_that_drives_one_way_is_no_supply(tmp_path):
-    """A motor that runs up on a steady voltage: its current falls and never turns round."""
-    t = 0.01 * np.arange(200)
-    columns = {
-        "t [s]": t,
-        "speed [rad/s]": 50.0 * (1.0 - np.exp(-t)),
-        "current [A]": np.exp(-t),
-        "voltage [V]": 12.0 + 0.0 * t,
-    }
-    path = tmp_path / "bench.csv"
-    np.savetxt(path, np.column_stack([*columns.values()]), delimiter=",", header=",".join(columns), comments="")
-    answer = CliRunner().invoke(cli, ["records", "map", str(path)], catch_exceptions=False)
-    assert channels(answer)["voltage [V]"] == ("u_q", "V")
-
-
 @pytest.mark.parametrize(
     ("titles", "units", "wanted"),
     [
