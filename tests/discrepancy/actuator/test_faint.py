@@ -41,9 +41,18 @@ def test_nothing_is_told_where_what_was_found_may_do_or_what_leads_is_no_cause()
     for found in ((), ("supply_sag",)):
         of = model(*found)
         assert faint.hear(*weighed(found, nothing=0.999, cogging=0.001), of) is None
-        assert faint.hear(*weighed(found, clock_skew=0.9, nothing=0.1), of) is None  # likelier, and not sure
         assert faint.hear(*weighed(found, incredible=0.99, nothing=0.01), of) is None
         assert faint.hear(*weighed(found, nothing=1.0), of) is None
+
+
+def test_that_anything_is_missing_must_be_sure_and_a_further_cause_likely():
+    """Beside gains of sensors and of the recorder, late comparators had 0.84 and were not told."""
+    likely = {"comparator_delay": 0.84, "nothing": 0.16}
+    assert faint.hear(*weighed((), **likely), model()) is None
+    heard, _ = faint.hear(*weighed(("current_gain",), **likely), model("current_gain"))
+    assert heard.names == ("current_gain", "comparator_delay")
+    unlikely = {"comparator_delay": 0.4, "nothing": 0.6}
+    assert faint.hear(*weighed(("current_gain",), **unlikely), model("current_gain")) is None
 
 
 def test_what_stands_in_the_place_of_what_was_found_is_not_more():

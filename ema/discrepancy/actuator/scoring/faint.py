@@ -16,7 +16,7 @@ from ema.discrepancy.actuator.fitting.model import NEAR, Model, ways_of
 from ema.discrepancy.actuator.fitting.problem import as_cause, cost_of
 from ema.discrepancy.actuator.simulating.noise import Verdict
 from ema.discrepancy.engine.contest import BEHIND, Outcome
-from ema.discrepancy.grade import IN_SET
+from ema.discrepancy.grade import IN_SET, NAMED
 
 if TYPE_CHECKING:
     from ema.discrepancy.actuator.fitting.search import Search
@@ -83,11 +83,15 @@ def may_hide_something(model: Model, v: Verdict) -> bool:
 
 
 def hear(outcome: Outcome, models: list[Model], found: Model) -> tuple[Model, tuple[str, ...]] | None:
-    """The likeliest model of one effect more than `found` and the others that it may be, where the score is sure."""
+    """The likeliest model of one effect more than `found` and the others that it may be, where that is likely enough.
+
+    That anything is missing has to be sure. Beside what is missing a further cause is told as every other is.
+    """
     names = set(found.names)
+    enough = NAMED if names else SURE
     more = {e.causes: e.probability for e in outcome.posterior if names < set(e.causes)}
     first = next((m for m in models if names < set(m.names) and len(m.names) == len(names) + 1), None)
-    if first is None or sum(more.values()) < SURE or not is_credible(first):
+    if first is None or sum(more.values()) < enough or not is_credible(first):
         return None
     others = [(set(of) - names, p) for of, p in more.items() if len(of) == len(first.names)]
     return first, tuple(name for new, p in others for name in new - set(first.names) if p >= IN_SET)

@@ -140,7 +140,7 @@ def _fit_unweighed(search: Search, found: Answer, weighed: Sequence[Model]) -> l
 def _go_on_from_heard(search: Search, path: Path, found: Answer, model: Model, rivals: tuple[str, ...]) -> Answer:
     """What the score has heard beside what was `found`, at its minimum, and what there is to be found beside both."""
     left = " + ".join(found.model.names) or "faults alone"
-    search.say(f"{model.names[-1]}: {left} leave about noise, and the score is sure of more")
+    search.say(f"{model.names[-1]}: {left} leave about noise, and the score hears more")
     alike = [*found.alike, rivals]
     model, v = settle_at_minimum(search, model, search.verdict(model), alike)
     if not v.is_noise:
