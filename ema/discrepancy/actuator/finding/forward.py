@@ -12,10 +12,10 @@ import numpy as np
 
 from ema.core.names import FAULTS
 from ema.discrepancy.actuator.fitting.candidates import Way
-from ema.discrepancy.actuator.fitting.comparators import PLAIN, take_step
+from ema.discrepancy.actuator.fitting.comparators import PLAIN
+from ema.discrepancy.actuator.fitting.conditions import Conditions
 from ema.discrepancy.actuator.fitting.fit import fit
 from ema.discrepancy.actuator.fitting.model import CHANCE, DISTANT, FAR, NEAR, Model, strip
-from ema.discrepancy.actuator.fitting.zeros import take_zero
 from ema.discrepancy.actuator.simulating.noise import Noise, Verdict
 
 from .ridge import sort_by_nearness, subtract_common, walk_ridge
@@ -108,14 +108,13 @@ def try_other_first_effects(
     )
     if not found or found[0].excess > CLOSE * model.excess:
         return model, v
-    noise, step, late, zero = search.noise, search.plant.step, search.plant.late, search.plant.data.zero
+    noise, conditions = search.noise, Conditions.of(search.plant)
     sets: list[tuple[str, ...]] = [tuple(m.names[-1] for m in found[1:] if is_alike(m, found[0]))]
     made, w = judge_closely(search, found[0], search.verdict(found[0]))
     made, w = add_effects(search, before, made, w, sets)
     if not w.is_noise and made.excess > CLOSE * model.excess:
-        search.noise, search.plant.late = noise, late
-        take_zero(search.plant, zero)
-        take_step(search.plant, step)
+        search.noise = noise
+        conditions.take(search.plant)
         return model, v
     search.say(f"{' + '.join(made.names)} instead of {' + '.join(model.names) or 'nothing'}")
     alike[:] = sets

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 from ema.core.names import FAULTS
 from ema.core.records import Array
-from ema.discrepancy.actuator.fitting.comparators import PLAIN, take_step
+from ema.discrepancy.actuator.fitting.comparators import PLAIN
+from ema.discrepancy.actuator.fitting.conditions import Conditions
 from ema.discrepancy.actuator.fitting.growing import is_steady
 from ema.discrepancy.actuator.fitting.model import CHANCE, DISTANT, Model
 from ema.discrepancy.actuator.fitting.search import Search, start_model
 from ema.discrepancy.actuator.fitting.timing import find_samples_late
-from ema.discrepancy.actuator.fitting.zeros import take_zero
 from ema.discrepancy.actuator.simulating.noise import Noise, Verdict
 from ema.discrepancy.actuator.simulating.plant import EmaPlant
 from ema.discrepancy.plant import Point
@@ -23,18 +23,14 @@ from .verdicts import FAULT_ALARM, NEARLY, judge_closely, take_bench_conditions
 
 @dataclass(frozen=True)
 class Path:
-    """One way through the search: with what noise, step of the comparators and command, from where to where.
-
-    The `zero` is by how much those of rotor and user are taken to lie apart. [rad]
+    """One way through the search: with what noise and under which conditions of the record, from where to where.
 
     `alike` holds, for each effect of `after`, what does as well in its place, `as_well` the effects that would explain
     as well what several of its faults have in common.
     """
 
     noise: Noise
-    step: float | None
-    late: int
-    zero: float | None
+    conditions: Conditions
     tried: list[Model]
     before: Model
     verdict_before: Verdict
@@ -47,10 +43,8 @@ class Path:
     def of(cls, search: Search, model: Model) -> Path:
         """The beginning, where nothing is explained yet."""
         v = search.verdict(model)
-        plant = search.plant
-        return cls(
-            search.noise, plant.step, plant.late, plant.data.zero, list(search.tried), model, v, model, v, [], []
-        )
+        conditions = Conditions.of(search.plant)
+        return cls(search.noise, conditions, list(search.tried), model, v, model, v, [], [])
 
 
 def begin_with_faults(search: Search, of_each: Array, point: Point) -> Search:
@@ -58,8 +52,8 @@ def begin_with_faults(search: Search, of_each: Array, point: Point) -> Search:
     mean = of_each.mean(axis=0)
     old = search.plant
     plant = EmaPlant(old.plant, replace(old.data, faults=of_each - mean), old.n_threads, old.resonance)
-    plant.late, plant.work, plant.leaves_zero_open = old.late, old.work, old.leaves_zero_open
-    take_step(plant, old.step)
+    plant.work, plant.leaves_zero_open = old.work, old.leaves_zero_open
+    Conditions.of(old).take(plant)
     noise = Noise(plant, {**point, **dict(zip(FAULTS, mean.tolist(), strict=True))})
     return Search(plant, noise, search.train, search.heldout, search.say)
 
@@ -132,11 +126,9 @@ def choose_path(search: Search, paths: list[Path]) -> Path:
 
 
 def resume(search: Search, path: Path) -> None:
-    """Noise, tried models and conditions of the bench as they are on a path."""
+    """Noise, tried models and conditions of the record as they are on a path."""
     search.noise, search.tried = path.noise, list(path.tried)
-    take_step(search.plant, path.step)
-    search.plant.late = path.late
-    take_zero(search.plant, path.zero)
+    path.conditions.take(search.plant)
 
 
 def put_one_in_place_of_faults(
@@ -181,6 +173,5 @@ def _go(search: Search, begun: Path) -> Path:
     after, v = try_other_first_effects(search, before, after, v, alike)
     if verdict_before.is_noise:
         after, v = simplify(search, before, after, v, alike, as_well)
-    plant = search.plant
-    conditions = plant.step, plant.late, plant.data.zero
-    return Path(search.noise, *conditions, search.tried, before, verdict_before, after, v, alike, as_well)
+    conditions = Conditions.of(search.plant)
+    return Path(search.noise, conditions, search.tried, before, verdict_before, after, v, alike, as_well)
