@@ -28,9 +28,12 @@ def covariance(gram: Array, blocks: Iterable[tuple[Array, Array]], least: float 
     Bell and McCaffrey, "Bias reduction in standard errors for linear regression with multi-stage samples", Survey
     Methodology 28, 2002 (the jackknife).
     """
-    moved = np.array([np.linalg.pinv(gram - own, rcond=least, hermitian=True) @ score for own, score in blocks])
-    n = len(moved)
+    parts = list(blocks)
+    n = len(parts)
     if n < 2:
         return np.zeros_like(gram)
+    grams, scores = zip(*parts, strict=True)
+    others = np.linalg.pinv(gram - np.stack(grams), rcond=least, hermitian=True)  # (n_blocks, n, n), all at once
+    moved = (others @ np.stack(scores)[..., None])[..., 0]
     moved -= moved.mean(axis=0)
     return np.asarray(moved.T @ moved * (n - 1) / n)

@@ -167,7 +167,7 @@ def shown_by(found: Rows, every: Sequence[Law]) -> list[Law]:
         if law.needs_acting:
             out.append(law)
             continue
-        A = np.column_stack(found.of(law, Acting(m.drive, m.drive, m.drive)))
+        A = found.of(law, Acting(m.drive, m.drive, m.drive)).T
         if law.family in LINES and _passes_within(found, law, A):
             continue
         beside = np.linalg.norm(A - q @ (q.T @ A), axis=0)

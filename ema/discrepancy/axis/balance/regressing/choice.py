@@ -134,8 +134,7 @@ def _gains(found: Rows, model: Regression, members: Sequence[Law]) -> Array:
     """What each member would take of the square that is left, shape (n_members,)."""
     q, _ = np.linalg.qr(model.design)
     left = model.left - q @ (q.T @ model.left)
-    columns = [found.of(law, model.acting) for law in members]
-    A = np.array(columns)  # (n_members, n_columns, n_rows)
+    A = np.stack([found.of(law, model.acting) for law in members])  # (n_members, n_columns, n_rows)
     A -= (A @ q) @ q.T
     gram, b = A @ A.transpose(0, 2, 1), A @ left
     return np.asarray(np.einsum("mc,mcd,md->m", b, np.linalg.pinv(gram, rcond=1e-6, hermitian=True), b))

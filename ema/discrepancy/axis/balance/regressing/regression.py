@@ -157,7 +157,7 @@ def _turns_inertia(model: Regression, other: Regression) -> bool:
 
 def regress(rows: Rows, plain: Plain, laws: Sequence[Law], *, apart: bool = False) -> Regression:
     """Fit the base and `laws`; the base `apart`: one column for each record."""
-    base, columns = _base(rows)
+    base, columns = tuple(rows.base), np.column_stack(list(rows.base.values()))
     if apart:
         records = rows.motion.records
         base = tuple(f"{name}{BY_RECORD} {k}" for name in base for k in range(len(records)))
@@ -181,26 +181,6 @@ def regress(rows: Rows, plain: Plain, laws: Sequence[Law], *, apart: bool = Fals
     return Regression(rows, plain, tuple(laws), base, A, coefficients, left, _held_out(rows, A), acting)
 
 
-def _base(rows: Rows) -> tuple[tuple[str, ...], Array]:
-    """Columns of inertia, dry friction and drag: those that the motions can show."""
-    m = rows.motion
-    parts = {
-        "inertia": rows.alpha,
-        "dry_friction": rows.integrate @ m.direction,
-        "viscous_drag": rows.integrate @ m.w,
-    }
-    kept: dict[str, Array] = {}
-    for name, column in parts.items():
-        size = float(np.linalg.norm(column))
-        if size == 0.0:
-            continue
-        other = np.column_stack(list(kept.values())) if kept else np.zeros((len(column), 1))
-        beside = column - other @ np.linalg.lstsq(other, column, rcond=None)[0]
-        if float(np.linalg.norm(beside)) > 0.03 * size:
-            kept[name] = column
-    return tuple(kept), np.column_stack(list(kept.values()))
-
-
 def _solve(design: Array, y: Array) -> Array:
     size = np.linalg.norm(design, axis=0)
     size = np.where(size > 0.0, size, 1.0)  # of what no row shows the coefficient is 0, and no digit of it over nothing
@@ -209,7 +189,8 @@ def _solve(design: Array, y: Array) -> Array:
 
 
 def _of_normal(gram: Array, right: Array) -> Array:
-    return np.asarray(np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ right)
+    """The solution of one or of several systems, shapes (..., n, n) and (..., n)."""
+    return np.asarray((np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ right[..., None])[..., 0])
 
 
 def _held_out(rows: Rows, design: Array) -> Array:
@@ -219,9 +200,10 @@ def _held_out(rows: Rows, design: Array) -> Array:
     parts = [(A[fold == k].T @ A[fold == k], A[fold == k].T @ rows.y[fold == k]) for k in range(N_FOLDS)]
     gram, right = (np.sum(column, axis=0) for column in zip(*parts, strict=True))
     out = np.full(len(rows.y), np.nan)
-    for k, (own_gram, own_right) in enumerate(parts):
+    others = _of_normal(gram - np.stack([own for own, _ in parts]), right - np.stack([own for _, own in parts]))
+    for k, coefficients in enumerate(others):
         test = (fold == k) & rows.whole
-        out[test] = rows.y[test] - A[test] @ _of_normal(gram - own_gram, right - own_right)
+        out[test] = rows.y[test] - A[test] @ coefficients
     return out
 
 

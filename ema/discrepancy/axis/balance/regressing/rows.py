@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from ema.core.records import Array
     from ema.discrepancy.axis.balance.laws.law import Acting, Law
     from ema.discrepancy.axis.balance.laws.motion import Motion
+
+SHOWN = 0.03  # of a column's size that those before it must leave
 
 
 @dataclass(frozen=True)
@@ -47,24 +50,49 @@ class Rows:
     record: NDArray[np.int_]
     sigma: Array
     half: float
-    known: dict[str, list[Array]] = field(default_factory=dict)
+    known: dict[str, Array] = field(default_factory=dict)
 
-    def of(self, law: Law, acting: Acting) -> list[Array]:
-        """Columns of a law over the rows; those that do not depend on what else acts are integrated once."""
+    def of(self, law: Law, acting: Acting) -> Array:
+        """Columns of a law over the rows, shape (n_columns, n_rows).
+
+        Those that do not depend on what else acts are integrated once.
+        """
         if law.repeats is not None:  # no row lies across two records
             own = self.of(law.repeats, acting)
-            return [column * (self.record == k) for k in range(len(self.motion.records)) for column in own]
+            return np.concatenate([own * (self.record == k) for k in range(len(self.motion.records))])
         if law.needs_acting:
-            return [self.integrate @ column for column in law.columns(self.motion, acting)]
+            return np.stack([self.integrate @ column for column in law.columns(self.motion, acting)])
         if law.key not in self.known:
             parts = (
                 law.weak(self.motion) if law.weak else [(column, None) for column in law.columns(self.motion, acting)]
             )
-            self.known[law.key] = [
-                self.integrate @ column + (0.0 if momentum is None else self.differentiate @ momentum)
-                for column, momentum in parts
-            ]
+            self.known[law.key] = np.stack(
+                [
+                    self.integrate @ column + (0.0 if momentum is None else self.differentiate @ momentum)
+                    for column, momentum in parts
+                ]
+            )
         return self.known[law.key]
+
+    @cached_property
+    def base(self) -> dict[str, Array]:
+        """Columns of what always acts, inertia, dry friction and drag: those that the motions can show."""
+        m = self.motion
+        parts = {
+            "inertia": self.alpha,
+            "dry_friction": self.integrate @ m.direction,
+            "viscous_drag": self.integrate @ m.w,
+        }
+        kept: dict[str, Array] = {}
+        for name, column in parts.items():
+            size = float(np.linalg.norm(column))
+            if size == 0.0:
+                continue
+            other = np.column_stack(list(kept.values())) if kept else np.zeros((len(column), 1))
+            beside = column - other @ np.linalg.lstsq(other, column, rcond=None)[0]
+            if float(np.linalg.norm(beside)) > SHOWN * size:
+                kept[name] = column
+        return kept
 
     @property
     def n_blocks(self) -> int:
