@@ -21,6 +21,7 @@ from ema.discrepancy.axis.balance.records.course import Course
 from ema.discrepancy.axis.balance.records.sampled import join
 from ema.discrepancy.axis.balance.records.widths import half_widths
 from ema.discrepancy.axis.balance.regressing import choice
+from ema.discrepancy.axis.balance.regressing.agreement import agreements
 from ema.discrepancy.axis.balance.regressing.apart import apart, by_record
 from ema.discrepancy.axis.balance.regressing.choice import choose_laws
 from ema.discrepancy.axis.balance.regressing.found import Balance
@@ -83,6 +84,26 @@ def test_nothing_is_chosen_where_nothing_acts_and_a_drag_where_one_does():
     (term,) = choose_laws(rows(m, torque=2e-3 * m.w * np.abs(m.w), noise=0.01), PLAIN, every).terms
     assert term.law.key == "quadratic drag"
     assert term.wins > 0.95
+
+
+def test_records_that_each_move_one_way_do_not_tell_friction_from_a_constant_torque():
+    """Of two run-ups of a real motor friction was told as -5.002 ± 0.0005 N m in one and 5.024 in the other."""
+    m = motion()
+    one_way = np.where(m.record == 0, 1.0, -1.0)
+    w = one_way * (20.0 + np.abs(m.w))
+    friction = F_D * one_way + C * w
+    m = replace(m, w=w, direction=one_way, drive=J * m.a + friction, known=J * m.a)
+    made = rows(m, torque=0.03, noise=1e-4)
+    (constant,) = (law for law in laws(m, linear=False) if law.key == "constant")
+    fit = regress(made, PLAIN, [constant], apart=True)
+    sd = np.sqrt(np.diag(fit.covariance()))
+    untold = [k for k, name in enumerate((*fit.base, "constant")) if name.startswith(("dry_friction", "constant"))]
+    assert len(untold) == 3
+    assert (np.abs(fit.coefficients[untold]) <= 0.03).all()  # beyond the plant file's friction
+    assert (sd[untold] > 0.03).all()
+    found = {a.name: a for a in agreements(made, PLAIN, regress(made, PLAIN, [constant]))}
+    assert found["dry_friction"].p > 0.5
+    assert not any(found["dry_friction"].could)
 
 
 def test_a_choice_whose_tests_go_round_ends_with_what_leaves_least(monkeypatch):

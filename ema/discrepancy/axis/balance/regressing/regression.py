@@ -15,7 +15,7 @@ from ema.effects.position_friction import EFFECT as STRETCH
 
 from .rows import Rows
 
-LEAST = 1e-8  # of the largest eigenvalue, below which a direction rests on the block that is left out alone
+LEAST = 1e-8  # of the largest eigenvalue, below which no row, or the block that is left out alone, tells a direction
 N_ROUNDS = 6  # of laws that depend on what else acts, which depends on them
 BELOW = 2.0  # deviations from zero, from which the sign of an inertia, a friction or a drag is sure
 N_FOLDS = 4  # interleaved: each holds out every fourth block
@@ -114,13 +114,18 @@ class Regression:
     def covariance(self) -> Array:
         """Of the coefficients, by leaving out one block after the other: rows overlap, and no law is quite right.
 
-        A coefficient that no row shows, as the inertia at a standstill, has none: its rows and columns are 0.
+        A coefficient that no row shows, as the inertia at a standstill, has none: its rows and columns are 0. Of
+        coefficients that only together show, as friction and a constant torque in motion one way, what each is may be
+        as large as the drive.
         """
         size = np.linalg.norm(self.design, axis=0)
         seen = size > 0.0
         A, n = self.design[:, seen] / size[seen], self.rows.n_blocks
         parts = [(A[own], self.left[own]) for own in (self.rows.block == b for b in range(n))]
         moved = blocks_left_out.covariance(A.T @ A, ((P.T @ P, P.T @ r) for P, r in parts), LEAST)
+        told, directions = np.linalg.eigh(A.T @ A)
+        untold = directions[:, told < LEAST * told[-1]]
+        moved += float(self.rows.y @ self.rows.y) * untold @ untold.T
         out = np.zeros((len(size), len(size)))
         out[np.ix_(seen, seen)] = moved / np.outer(size[seen], size[seen])
         return out
@@ -190,7 +195,7 @@ def _solve(design: Array, y: Array) -> Array:
 
 def _of_normal(gram: Array, right: Array) -> Array:
     """The solution of one or of several systems, shapes (..., n, n) and (..., n)."""
-    return np.asarray((np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ right[..., None])[..., 0])
+    return np.asarray((np.linalg.pinv(gram, rcond=LEAST, hermitian=True) @ right[..., None])[..., 0])
 
 
 def _held_out(rows: Rows, design: Array) -> Array:
