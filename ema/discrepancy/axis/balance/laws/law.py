@@ -59,6 +59,8 @@ class Law:
         The law of which it has the columns once for each record.
     finer : function share → laws
         Of a family whose members stand for all between them: those that lie this share of a step to both sides.
+    around : function share → laws
+        The same of a family of few members: asked for once the law is chosen, so that no finer member chooses it.
     freer : function (motion, acting) → arrays of shape (n_samples,)
         Of what has no name, and so no form: columns of the same with twice the freedom.
     """
@@ -78,6 +80,7 @@ class Law:
     repeats: Law | None = None
     weak: Callable[[Motion], Sequence[tuple[Array, Array]]] | None = None
     finer: Callable[[float], Sequence[Law]] | None = None
+    around: Callable[[float], Sequence[Law]] | None = None
     freer: Columns | None = None
 
 

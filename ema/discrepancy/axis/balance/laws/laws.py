@@ -84,19 +84,31 @@ def _by_speed(m: Motion, u: Units) -> Iterator[Law]:
     if not w.size or np.quantile(w, 0.05) > 0.5 * w.max():
         return
     low, high = max(float(np.quantile(w, 0.02)), 0.005 * float(w.max())), 0.4 * float(w.max())
-    for over in np.geomspace(low, high, N_SPEEDS) if high > low else ():
-        for power in (1.0, 2.0):
-            yield Law(
-                "stribeck",
-                f"stribeck {over:.3g} {power:g}",
-                "stribeck",
-                _falling(float(over), power),
-                {"more": u.torque, "speed": u.speed, "shape": "1"},
-                one("more", speed=float(over), shape=power - 1.0),
-                f"friction changes with speed, {{more:+.3g}} {u.torque} at rest, fading over {{speed:.3g}} {u.speed}",
-                "slow motion at several constant speeds",
-                is_friction=True,
-            )
+    if high > low:
+        step = (high / low) ** (1.0 / (N_SPEEDS - 1))
+        for over in np.geomspace(low, high, N_SPEEDS):
+            yield from (_stribeck(float(over), power, step, (low, high), u) for power in (1.0, 2.0))
+
+
+def _stribeck(over: float, power: float, step: float, ends: tuple[float, float], u: Units) -> Law:
+    """Friction that fades over a speed between `ends`; the family's next members fade over `step` times as much."""
+
+    def around(share: float) -> list[Law]:
+        near = (over * step**side for side in (-share, share))
+        return [_stribeck(x, power, step, ends, u) for x in near if ends[0] <= x <= ends[1]]
+
+    return Law(
+        "stribeck",
+        f"stribeck {over:.8g} {power:g}",
+        "stribeck",
+        _falling(over, power),
+        {"more": u.torque, "speed": u.speed, "shape": "1"},
+        one("more", speed=over, shape=power - 1.0),
+        f"friction changes with speed, {{more:+.3g}} {u.torque} at rest, fading over {{speed:.3g}} {u.speed}",
+        "slow motion at several constant speeds",
+        is_friction=True,
+        around=around,
+    )
 
 
 def _falling(over: float, power: float) -> Columns:

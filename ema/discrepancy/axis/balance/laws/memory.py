@@ -14,7 +14,7 @@ from ema.effects.friction_memory import built_up
 from .law import Columns, Law, one
 from .motion import Motion
 
-WAYS = tuple(np.geomspace(0.004, 0.5, 12).tolist())  # of the way between two reversals
+SHORTEST, LONGEST, N_WAYS = 0.004, 0.5, 12  # of the way between two reversals; members of the family between these
 GAP = 5.0  # median samples without a reading after which nothing is known of the bristles
 
 
@@ -23,20 +23,34 @@ def memory_laws(m: Motion, torque: str, place: str) -> Iterator[Law]:
     new = np.diff(m.t, prepend=m.t[0] - 1.0)
     begins = (new <= 0.0) | (new > GAP * float(np.median(new))) | m.static
     stroke = _stroke(m, begins)
-    for share in WAYS if stroke > 0.0 else ():
-        way = share * stroke
-        yield Law(
-            "friction with memory",
-            f"memory {way:.4g}",
-            "friction_memory",
-            _not_yet(begins, way),
-            {"torque": torque, "deflection": place},
-            one("torque", deflection=way),
-            f"friction has a memory: after a reversal {{torque:.3g}} {torque} of it build up over "
-            f"{{deflection:.3g}} {place} (presliding)",
-            "small reversing motions of several amplitudes at several frequencies",
-            is_friction=True,
-        )
+    step = (LONGEST / SHORTEST) ** (1.0 / (N_WAYS - 1))
+    ends = SHORTEST * stroke, LONGEST * stroke
+    for way in np.geomspace(*ends, N_WAYS) if stroke > 0.0 else ():
+        yield _memory(begins, float(way), step, ends, torque, place)
+
+
+def _memory(
+    begins: NDArray[np.bool_], way: float, step: float, ends: tuple[float, float], torque: str, place: str
+) -> Law:
+    """Friction that builds up over a `way` between `ends`; the family's next members are `step` times as long."""
+
+    def around(share: float) -> list[Law]:
+        near = (way * step**side for side in (-share, share))
+        return [_memory(begins, x, step, ends, torque, place) for x in near if ends[0] <= x <= ends[1]]
+
+    return Law(
+        "friction with memory",
+        f"memory {way:.8g}",
+        "friction_memory",
+        _not_yet(begins, way),
+        {"torque": torque, "deflection": place},
+        one("torque", deflection=way),
+        f"friction has a memory: after a reversal {{torque:.3g}} {torque} of it build up over "
+        f"{{deflection:.3g}} {place} (presliding)",
+        "small reversing motions of several amplitudes at several frequencies",
+        is_friction=True,
+        around=around,
+    )
 
 
 def _stroke(m: Motion, begins: NDArray[np.bool_]) -> float:

@@ -114,12 +114,16 @@ def _add(model: Regression, law: Law) -> list[Law]:
     return [*(own for own in model.laws if law.repeats is None or own.key != law.repeats.key), law]
 
 
-def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
-    """The member of a family whose columns take most of what is left, or one that lies between two members."""
+def _best(found: Rows, model: Regression, members: Sequence[Law], *, chosen: bool = False) -> Law:
+    """The member of a family whose columns take most of what is left, or one that lies between two members.
+
+    Where the law is `chosen` already, of a family of few members too.
+    """
     best = _best_of(found, model, members)
     for k in range(1, N_FINER + 1):
-        if best.finer is not None:
-            best = _best_of(found, model, [best, *best.finer(0.5**k)])
+        between = best.finer or (best.around if chosen else None)
+        if between is not None:
+            best = _best_of(found, model, [best, *between(0.5**k)])
     return best
 
 
@@ -150,7 +154,7 @@ def _best_members(found: Rows, plain: Plain, model: Regression, every: Sequence[
         without = regress(found, plain, [own for own in model.laws if own.key != law.key])
         members = [own for own in every if own.family == law.family] or [law]
         same = [own for own in members if own.name == law.name]
-        other = regress(found, plain, _add(without, _best(found, without, same or [law])))
+        other = regress(found, plain, _add(without, _best(found, without, same or [law], chosen=True)))
         model = other if other.loss < model.loss else model
         for own in members if law.needs_acting else ():
             other = regress(found, plain, _add(without, own))
@@ -247,7 +251,8 @@ def _near_members(
     if law.family in LINES and law.finer is None:
         return ()
     same = [own for own in every if own.family == law.family and own.name == law.name]
-    same += [own for k in range(1, N_FINER + 1) if law.finer is not None for own in law.finer(0.5**k)]
+    between = law.finer or law.around
+    same += [own for k in range(1, N_FINER + 1) if between is not None for own in between(0.5**k)]
     same = [own for own in same if own.key != law.key]
     if not same:
         return ()
