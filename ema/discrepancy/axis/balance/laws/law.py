@@ -84,6 +84,18 @@ class Law:
     freer: Columns | None = None
 
 
+def members_around(
+    member: Callable[[float], Law], at: float, step: float, ends: tuple[float, float]
+) -> Callable[[float], Sequence[Law]]:
+    """`around` of a family along one size: what lies a share of a `step`, a factor, to both sides, between `ends`."""
+
+    def around(share: float) -> list[Law]:
+        near = (at * step**side for side in (-share, share))
+        return [member(x) for x in near if ends[0] <= x <= ends[1]]
+
+    return around
+
+
 def one(name: str, **shape: float) -> Values:
     """The only coefficient, and the shape of the law beside it."""
 

@@ -14,7 +14,7 @@ from ema.core.records import Array
 
 from .along import by_position
 from .drifting import drift_laws
-from .law import Acting, Columns, Law, one
+from .law import Acting, Columns, Law, members_around, one
 from .links import coupled_friction
 from .memory import memory_laws
 from .motion import Motion
@@ -92,11 +92,6 @@ def _by_speed(m: Motion, u: Units) -> Iterator[Law]:
 
 def _stribeck(over: float, power: float, step: float, ends: tuple[float, float], u: Units) -> Law:
     """Friction that fades over a speed between `ends`; the family's next members fade over `step` times as much."""
-
-    def around(share: float) -> list[Law]:
-        near = (over * step**side for side in (-share, share))
-        return [_stribeck(x, power, step, ends, u) for x in near if ends[0] <= x <= ends[1]]
-
     return Law(
         "stribeck",
         f"stribeck {over:.8g} {power:g}",
@@ -107,7 +102,7 @@ def _stribeck(over: float, power: float, step: float, ends: tuple[float, float],
         f"friction changes with speed, {{more:+.3g}} {u.torque} at rest, fading over {{speed:.3g}} {u.speed}",
         "slow motion at several constant speeds",
         is_friction=True,
-        around=around,
+        around=members_around(lambda x: _stribeck(x, power, step, ends, u), over, step, ends),
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ema.core.records import Array
 from ema.effects.friction_memory import built_up
 
-from .law import Columns, Law, one
+from .law import Columns, Law, members_around, one
 from .motion import Motion
 
 SHORTEST, LONGEST, N_WAYS = 0.004, 0.5, 12  # of the way between two reversals; members of the family between these
@@ -33,11 +33,6 @@ def _memory(
     begins: NDArray[np.bool_], way: float, step: float, ends: tuple[float, float], torque: str, place: str
 ) -> Law:
     """Friction that builds up over a `way` between `ends`; the family's next members are `step` times as long."""
-
-    def around(share: float) -> list[Law]:
-        near = (way * step**side for side in (-share, share))
-        return [_memory(begins, x, step, ends, torque, place) for x in near if ends[0] <= x <= ends[1]]
-
     return Law(
         "friction with memory",
         f"memory {way:.8g}",
@@ -49,7 +44,7 @@ def _memory(
         f"{{deflection:.3g}} {place} (presliding)",
         "small reversing motions of several amplitudes at several frequencies",
         is_friction=True,
-        around=around,
+        around=members_around(lambda x: _memory(begins, x, step, ends, torque, place), way, step, ends),
     )
 
 

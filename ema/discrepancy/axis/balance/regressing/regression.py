@@ -122,8 +122,9 @@ class Regression:
         seen = size > 0.0
         A, n = self.design[:, seen] / size[seen], self.rows.n_blocks
         parts = [(A[own], self.left[own]) for own in (self.rows.block == b for b in range(n))]
-        moved = blocks_left_out.covariance(A.T @ A, ((P.T @ P, P.T @ r) for P, r in parts), LEAST)
-        told, directions = np.linalg.eigh(A.T @ A)
+        gram = A.T @ A
+        moved = blocks_left_out.covariance(gram, ((P.T @ P, P.T @ r) for P, r in parts), LEAST)
+        told, directions = np.linalg.eigh(gram)
         untold = directions[:, told < LEAST * told[-1]]
         moved += float(self.rows.y @ self.rows.y) * untold @ untold.T
         out = np.zeros((len(size), len(size)))
