@@ -82,7 +82,7 @@ def add_effects(
                 break
             real, noise = near, Noise(search.plant, after.fit.point)
         rivals = [m for m in rivals if is_alike(m, after) and not may_be_nothing(search, m, m.effects[-1])]
-        alike.append(tuple(m.names[-1] for m in rivals))
+        _tell_rivals(alike, after, rivals)
         after, v = judge_closely(search, after, search.verdict(after))
         if not v.is_noise:
             after, v = take_bench_conditions(search, after, v, PLAIN)
@@ -91,6 +91,12 @@ def add_effects(
             after, v = settle_at_minimum(search, after, v, alike) if is_near else begin_again(search, after, v)
         search.say(f"{' + '.join(after.names)}: p = {v.p_value:.2g}")
     return after, v
+
+
+def _tell_rivals(alike: list[tuple[str, ...]], model: Model, rivals: Sequence[Model]) -> None:
+    """Add the rivals of the last effect of `model` to those of each; what came together with it has none."""
+    alike.extend(() for _ in range(len(model.effects) - 1 - len(alike)))
+    alike.append(tuple(m.names[-1] for m in rivals))
 
 
 def try_other_first_effects(
@@ -109,7 +115,8 @@ def try_other_first_effects(
     if not found or found[0].excess > CLOSE * model.excess:
         return model, v
     noise, conditions = search.noise, Conditions.of(search.plant)
-    sets: list[tuple[str, ...]] = [tuple(m.names[-1] for m in found[1:] if is_alike(m, found[0]))]
+    sets: list[tuple[str, ...]] = []
+    _tell_rivals(sets, found[0], [m for m in found[1:] if is_alike(m, found[0])])
     made, w = judge_closely(search, found[0], search.verdict(found[0]))
     made, w = add_effects(search, before, made, w, sets)
     if not w.is_noise and made.excess > CLOSE * model.excess:
@@ -288,7 +295,8 @@ def _fit_most_promising(
 
 
 def _fit_candidate(search: Search, model: Model, s: Screened, to_beat: float = np.inf) -> Model:
-    frees = (*model.fit.free, *s.candidate.frees)
+    added = (*(c for c in s.candidate.beside if c.effect not in model.names), s.candidate)
+    frees = (*model.fit.free, *(f for c in added for f in c.frees))
     start, cost = search.better([s.start, start_with(search, model, s.candidate, dict.fromkeys(FAULTS, 0.0))], model)
     if model.shows_faults_of(s.candidate):
         # One effect for several faults, or for what they have in common, is the simpler cause; noise in the
@@ -300,7 +308,7 @@ def _fit_candidate(search: Search, model: Model, s: Screened, to_beat: float = n
         simpler, simpler_cost = search.better([alone.point], model)
         if simpler_cost < NO_WORSE * cost:
             start = simpler
-    made = search.model((*model.effects, s.candidate), frees, start, model.fit.columns, 3, to_beat)
+    made = search.model((*model.effects, *added), frees, start, model.fit.columns, 3, to_beat)
     return walk_ridge(search, model, made, s.candidate, to_beat) if model.shows_faults_of(s.candidate) else made
 
 

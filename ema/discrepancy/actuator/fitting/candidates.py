@@ -47,6 +47,8 @@ class Candidate:
         Parameters that the effect is (nearly) proportional to; one probe each.
     shown : tuple of float
         Their values, less neutral, as the residual torque or the sensors' zeros themselves show them; else none.
+    beside : tuple of Candidate
+        Other effects that the record shows together with it: without these no fit of it gets near.
     """
 
     effect: str
@@ -55,6 +57,7 @@ class Candidate:
     linear: tuple[str, ...]
     steps: tuple[float, ...]
     shown: tuple[float, ...] = ()
+    beside: tuple[Candidate, ...] = ()
 
     @property
     def faults(self) -> list[str]:
@@ -153,8 +156,9 @@ class Seen(Candidate):
         return True
 
     def start(self, values: Array) -> Point:
-        """The probe, and faults that are seen beside it."""
-        return {**self.probes()[0], **self.faults_seen}
+        """The probe, and the faults and effects that are seen beside it."""
+        there = {name: x for c in self.beside for name, x in c.probes()[0].items()}
+        return {**self.probes()[0], **self.faults_seen, **there}
 
     def sizes(self) -> list[Point]:
         """None but what is seen."""
@@ -299,7 +303,8 @@ def candidates(
         step = {"compliance": gear.compliance}
         held_back = {name: x for name, x in (("drag", gear.drag), ("friction", gear.friction)) if x}
         c = _plain("gear_compliance", "compliance", step=step, inertia=gear.inertia, damping=gear.damping, **held_back)
-        found.append(Seen(**vars(c), faults_seen={"k2": gear.k2}))
+        spring = (_plain("spring_load", "stiffness", step={"stiffness": gear.spring}),) if gear.spring else ()
+        found.append(Seen(**vars(replace(c, beside=spring)), faults_seen={"k2": gear.k2}))
     for of in lines(torques):
         frees = (
             free(f"{line}.amplitude", 0.002),

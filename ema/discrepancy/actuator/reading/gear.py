@@ -63,8 +63,8 @@ REST = 0.1  # [N m] what is left of a cycle's torque balance, root of the sum of
 class Resonance(NamedTuple):
     """Start values of the effect `gear_compliance`, in its units; and what comes with them.
 
-    `k2` is the fault beside it, `starts` are θ_u as it is read and ω_u at the start of each cycle, shape (n_cycles, 2).
-    [rad, rad/s]
+    `spring` is the stiffness of a spring at the user that shows with it [N m/rad], `k2` the fault beside it, `starts`
+    are θ_u as it is read and ω_u at the start of each cycle, shape (n_cycles, 2). [rad, rad/s]
     """
 
     compliance: float
@@ -72,6 +72,7 @@ class Resonance(NamedTuple):
     damping: float
     drag: float
     friction: float
+    spring: float
     k2: float
     starts: Array
 
@@ -193,6 +194,7 @@ def find_resonance(plant: Actuator, data: Measured) -> Resonance | None:
         float(np.clip(gear.zeta, 0.005, 0.5)),
         gear.drag * inertia,
         gear.friction * inertia,
+        gear.spring * gear.w_0**2 * inertia,
         float(np.clip(k2, 0.0, 1.0)),
         np.stack([starts[:, 0] + off, starts[:, 1]], axis=1),
     )
