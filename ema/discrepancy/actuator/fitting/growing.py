@@ -63,9 +63,15 @@ def find_growing_faults(search: Search, model: Model) -> Array | None:
     fits = _fit_each_cycle(search, model.fit)
     left = {c: fitted.residuals[c] for c, fitted in zip(cycles, fits, strict=True)}
     faults = _faults(search, fits)
-    if _differ(search, left) >= DIFFER or (_is_warming(search) and np.ptp(faults, axis=0).max() < TOLD):
+    if _differ(search, left) >= DIFFER or _range_within(search, faults) < TOLD:
         return None
     return faults
+
+
+def _range_within(search: Search, faults: Array) -> float:
+    """The largest range of a fault between cycles of one motion; where motions alone differ, nothing grows."""
+    motion = search.plant.data.motion
+    return float(max(np.ptp(faults[motion == m], axis=0).max() for m in range(search.plant.n_motions)))
 
 
 def find_faults_beside(search: Search, model: Model) -> tuple[Array, Point]:

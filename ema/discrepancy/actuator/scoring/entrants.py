@@ -35,7 +35,8 @@ def weigh_sets(
     """Probabilities of the sets of effects that were tried, and the best model of each, likeliest first.
 
     Weighed are faults alone, the answer, what is in it, the `others` given, and those that leave least; and what is in
-    the set that leads then.
+    the set that leads then, which is brought to its minimum: columns of a fit on its way say that flat directions are
+    felt, and sizes with them would be told too surely.
     """
     search.say("probabilities of what was tried")
     after = search.at_minimum(after)
@@ -46,12 +47,12 @@ def weigh_sets(
         entrants = [_entrant(search, m) for m in models]
         first = {(e.names, e.parameters): m for m, e in reversed([*zip(models, entrants, strict=True)])}
         ranked = [first[w.entrant.names, w.entrant.parameters] for w in outcome.weighed]
-        leader = ranked[0]
-        smaller = _fit_subsets(search, leader, models)
-        if not smaller:
+        leader = search.at_minimum(ranked[0])
+        further = [*_fit_subsets(search, leader, models), *([] if leader is ranked[0] else [leader])]
+        if not further:
             return outcome, ranked
-        search.say(f"what is in {' + '.join(leader.names)}, which leads")
-        fitted += smaller
+        search.say(f"{' + '.join(leader.names)}, which leads, and what is in it")
+        fitted += further
 
 
 def weigh(search: Search, models: Sequence[Model]) -> Outcome:
