@@ -52,6 +52,7 @@ def test_what_is_in_the_set_that_leads_is_weighed_too(hidden, shipped_plant):
     fit_beside_a_lighter_rotor("current_gain")
     outcome, models = weigh_sets(search, before, fit_beside_a_lighter_rotor("recorder_gain"))
     assert models[0].names == outcome.posterior[0].causes == ("current_gain",)
+    assert models[0] is search.at_minimum(models[0])  # by columns of a fit on its way sizes are told too surely
     assert outcome.posterior[0].probability > 0.9
     for name, gain in gains.items():
         found, sd = outcome.sizes("current_gain")[f"current_gain.{name}"]
