@@ -46,7 +46,8 @@ class LogReader(Closing):
     ----------
     paths : path or paths
         Files or directories of files; read in the order of their first messages. Of copies of one flight, one. What is
-        no MCAP file in a directory of others is damage: a process that was killed may have left an empty segment.
+        no MCAP file in a directory of others is damage, and so is an empty one among files that are named, as by a
+        shell: a process that was killed may have left an empty segment.
     start_ns, end_ns : int, optional
         Only what happened in [start_ns, end_ns). [ns since the Unix epoch]
 
@@ -168,7 +169,7 @@ class LogReader(Closing):
             try:
                 self._files.append(McapFile(path, self._note))
             except NotMcapError as error:
-                if path in named:
+                if path in named and path.stat().st_size > 0:
                     raise
                 refused.append(error)
                 self._note(Damage(path, 0, error.what))
