@@ -228,15 +228,13 @@ def find_look_alikes(
 def find_one_for_several(
     search: Search, best: Model, several: Sequence[Candidate], screened: Sequence[Screened]
 ) -> list[Screened]:
-    """The nearest that can do some of what several effects of `best` do together, begun in their place."""
+    """The nearest that can do what several effects of `best` do together, begun in their place."""
     done = _what_is_done(search, best, several)
     own = stacked_jacobian(search.noise, strip(best, *several)[1], best.fit.columns, search.train)
     amounts = ((s, *_do_most(done, columns_of(search, s.candidate), own)) for s in screened)
     asked = [(s, values) for s, values, share in amounts if share > RESEMBLING]
     begun = _start_instead(search, best, several, done, asked, ())
-    left = search.costs([s.start for s in begun], search.train, typical=False) if begun else []
-    nearest = sorted(zip(left, begun, strict=True), key=lambda entry: entry[0])
-    return [s for _, s in nearest[:N_NEAREST]]
+    return _keep_alike(search, best, done, begun, near=True)[:N_NEAREST]
 
 
 def _what_is_done(search: Search, best: Model, effects: Sequence[Candidate]) -> Array:
@@ -273,9 +271,10 @@ def _start_instead(
 
 
 def _keep_alike(search: Search, best: Model, done: Array, begun: Sequence[Screened], near: bool) -> list[Screened]:
-    """Those whose starts, simulated, leave hardly more than `best`: no more than first order may be off by.
+    """Those whose starts, simulated, leave hardly more than `best`, nearest first.
 
-    What is found from noisy columns says little of what they leave: of runs that are random their difference does.
+    Hardly more is what first order may be off by. What is found from noisy columns says little of what they leave: of
+    runs that are random their difference does.
     """
     if not begun:
         return []
@@ -284,7 +283,8 @@ def _keep_alike(search: Search, best: Model, done: Array, begun: Sequence[Screen
     here, *there = [search.noise.misfit(list(at.values()), search.train) for at in left]
     off = (CURVED**2 if near else 1.0 - COLLINEAR**2) * float(done @ done) / search.noise.expected(search.train)
     more = off + (within_reach(best) - best.fit.misfit if near else 0.0)
-    return [s for s, misfit in zip(begun, there, strict=True) if misfit - here < more]
+    nearest = sorted(zip(there, begun, strict=True), key=lambda entry: entry[0])
+    return [s for misfit, s in nearest if misfit - here < more]
 
 
 def _columns_at(search: Search, point: Point, c: Candidate) -> Array:
