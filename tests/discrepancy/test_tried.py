@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ema.core import config, resources
+from ema.core.names import FAULTS
 from ema.discrepancy.actuator.fitting import candidates as actuator
 from ema.discrepancy.actuator.fitting import free
 from ema.discrepancy.actuator.reading.gear import Resonance
@@ -48,12 +49,15 @@ def test_the_actuator(monkeypatch):
     plant = config.load(resources.config("actuator.yaml"), Actuator)
     signals = SimpleNamespace(u_dc=np.full(100, 28.0), i=np.full((1, 3, 100), 5.0))
     data = SimpleNamespace(zero=0.0, dT=np.array([0.0, 30.0]), signals=[signals, signals], ranges=np.full(2, np.inf))
-    resonance = Resonance(1e-3, 1e-3, damping=0.1, drag=1.0, friction=0.1, spring=0.0, k2=0.0, starts=np.zeros((2, 2)))
+    resonance = Resonance(1e-3, 1e-3, damping=0.1, drag=1.0, friction=0.1, spring=9.0, k2=0.0, starts=np.zeros((2, 2)))
     monkeypatch.setattr(actuator, "lines", lambda torques: [ShownLine(18.0, 0.5, 3e-3, 4e-3)])
     monkeypatch.setattr(actuator, "bumps", lambda torques: [ShownStretch(0.01, 1e-3, 0.02)])
     both = ("cogging", "torque_line")
     found = [c for line in both for c in actuator.candidates(plant, data, [object()], line, resonance)]
     assert not missed("ema", {c.effect for c in found})
+    for c in found:  # what a candidate switches on is told by its name: what is seen beside it is a candidate itself
+        on = {name.split(".")[0] for name in c.start(np.zeros(len(c.amounts)))}
+        assert on <= {c.effect, *FAULTS}, c.key
 
 
 def test_the_axis(axis_bench):

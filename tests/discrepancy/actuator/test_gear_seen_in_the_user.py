@@ -65,7 +65,7 @@ def test_its_resonance_is_found_though_a_spring_holds_the_user(beside):
 
 @pytest.mark.further
 def test_a_spring_seen_with_the_gear_is_fitted_with_it():
-    """Neither leaves less than the other's absence hides: one at a time, none of them was kept."""
+    """One at a time neither was kept: the gear alone left more than nothing did."""
     plant, data = measure(3, hidden.MOTIONS, compliance=3e-5, spring=2500.0, k4=0.03)
     search, _ = begin(plant, data, 1, Progress(), {})
     alone = start_model(search, {})

@@ -295,14 +295,17 @@ def _fit_most_promising(
 
 
 def _fit_candidate(search: Search, model: Model, s: Screened, to_beat: float = np.inf) -> Model:
-    added = (*(c for c in s.candidate.beside if c.effect not in model.names), s.candidate)
+    beside = [c for c in s.candidate.beside if c.effect not in model.names]
+    seen = {name: x for c in beside for name, x in c.probes()[0].items()}
+    added = (*beside, s.candidate)
     frees = (*model.fit.free, *(f for c in added for f in c.frees))
-    start, cost = search.better([s.start, start_with(search, model, s.candidate, dict.fromkeys(FAULTS, 0.0))], model)
+    starts = [s.start, start_with(search, model, s.candidate, dict.fromkeys(FAULTS, 0.0))]
+    start, cost = search.better([{**at, **seen} for at in starts], model)
     if model.shows_faults_of(s.candidate):
         # One effect for several faults, or for what they have in common, is the simpler cause; noise in the
         # columns would leave the faults there.
         less = (dict.fromkeys(s.candidate.faults, 0.0), subtract_common(model, s.candidate))
-        nearer, _ = search.better([start_with(search, model, s.candidate, rest) for rest in less], model)
+        nearer, _ = search.better([{**start_with(search, model, s.candidate, rest), **seen} for rest in less], model)
         # From there the effect alone goes as far as it can.
         alone = fit(search.plant, search.noise, s.candidate.frees, nearer, search.train, n_iterations=3)
         simpler, simpler_cost = search.better([alone.point], model)

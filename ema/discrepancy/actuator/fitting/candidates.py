@@ -156,9 +156,8 @@ class Seen(Candidate):
         return True
 
     def start(self, values: Array) -> Point:
-        """The probe, and the faults and effects that are seen beside it."""
-        there = {name: x for c in self.beside for name, x in c.probes()[0].items()}
-        return {**self.probes()[0], **self.faults_seen, **there}
+        """The probe, and faults that are seen beside it."""
+        return {**self.probes()[0], **self.faults_seen}
 
     def sizes(self) -> list[Point]:
         """None but what is seen."""
