@@ -9,13 +9,14 @@ EFFECT = Effect(
     parameters=(
         Parameter("compliance", "rad/(N m)", 0.0, 0.0, 10.0, 0.01, "twist of the gear train per torque at the load"),
         Parameter("inertia", "kg m^2", 0.5, 1e-9, 1e5, 0.5, "inertia of the motor, as the load sees it"),
-        Parameter("damping", "1", 0.05, 0.005, 0.5, 0.05, "damping ratio of the resonance"),
+        Parameter("damping", "1", 0.05, 0.005, 0.5, 0.05, "damping ratio; above 1 the load creeps after the motor"),
         Parameter("drag", "N m s/rad", 0.0, 0.0, 1000.0, 5.0, "viscous drag at the motor"),
         Parameter("friction", "N m", 0.0, 0.0, 100.0, 1.0, "dry friction at the motor"),
     ),
     sentence=(
         "the gear train before the measured angle gives {compliance:.2g} rad per N m; "
-        "with the motor's {inertia:.2g} kg m² it resonates"
+        "with the motor's {inertia:.2g} kg m² it resonates, "
+        "or creeps where its damping ratio, {damping:.2g}, is above 1"
     ),
     separated_by="fast motion with the angles of motor and load both measured",
     plants=("axis",),

@@ -9,11 +9,14 @@ EFFECT = Effect(
     parameters=(
         Parameter("compliance", "rad/(N m)", 0.0, 0.0, 0.01, 3e-05, "twist of the gear train per torque at the user"),
         Parameter("inertia", "kg m^2", 0.5, 0.001, 10.0, 0.5, "inertia at the user"),
-        Parameter("damping", "1", 0.05, 0.005, 0.5, 0.05, "damping ratio of the resonance"),
+        Parameter("damping", "1", 0.05, 0.005, 0.5, 0.05, "damping ratio; above 1 the user creeps after the motor"),
         Parameter("drag", "N m s/rad", 0.0, 0.0, 1000.0, 5.0, "viscous drag at the user"),
         Parameter("friction", "N m", 0.0, 0.0, 100.0, 1.0, "dry friction at the user"),
     ),
-    sentence="the gear train gives {compliance:.2g} rad per N m; with {inertia:.2g} kg m² at the user it resonates",
+    sentence=(
+        "the gear train gives {compliance:.2g} rad per N m; with {inertia:.2g} kg m² at the user it resonates, "
+        "or creeps where its damping ratio, {damping:.2g}, is above 1"
+    ),
     separated_by="fast motion with the angles of motor and load both measured",
     mistaken_for=("k2",),
     plants=("ema", "axis"),

@@ -119,6 +119,23 @@ def test_a_motor_that_drives_a_measured_load_through_a_spring(support, behind):
     assert value["F_d"] + value["friction"] == pytest.approx(file["F_d"], rel=0.05)
 
 
+def test_a_load_that_a_slipping_clutch_drags_along_is_behind_a_gear_that_creeps(support):
+    """No spring, a torque by the difference of the speeds alone: an inertia that follows the motor, and never swings."""
+    strange = support("strange")
+    axis = strange.Axis()
+    rng = np.random.default_rng(3)
+    rng.uniform(0.0, 6.0, 3)  # phases of the reference, which `record` draws first
+    damping, share, _ = strange.sizes(strange.CLUTCH, axis, rng)
+    plant = AxisPlant(
+        RotaryAxis.model_validate(strange.plant(axis)), [strange.record("clutch", axis, 3, seconds=4.0)], n_threads=1
+    )
+    plant.between = "held"
+    value = fitted_gear(plant, axis.F)
+    assert value["inertia"] == pytest.approx(share * axis.J, rel=0.05)
+    reduced = share * (1.0 - share) * axis.J
+    assert 2.0 * value["damping"] * np.sqrt(reduced / value["compliance"]) == pytest.approx(damping, rel=0.1)
+
+
 def test_where_it_may_not_be_it_is_not_looked_for(resonating):
     every = on_paper.everywhere(resonating)
     assert gear_candidate(resonating, AT | {"gear_compliance.compliance": 1.0}, every) is None
