@@ -279,7 +279,7 @@ def _is_simpler(other: Outcome, one: Outcome) -> bool:
     """Whether less is left, hardly more by fewer effects, or far less by more."""
     rest, other_rest = (max(r.rms_after for r in o.records) for o in (one, other))
     if len(other.effects) > len(one.effects):
-        return other_rest**2 - 1.0 < MUCH * (rest**2 - 1.0)
+        return max(other_rest**2 - 1.0, 0.0) < MUCH * max(rest**2 - 1.0, 0.0)
     if len(other.effects) == len(one.effects):
         return other_rest < rest
     hardly = LITTLE * max(r.rms_before for r in one.records) ** 2
