@@ -19,10 +19,13 @@ resistance_factor     ΔT [K]                                                   
 inductance_factor     i_j [A]                                                    product on L_j          1
 angle_error           θ_m [rad]                                                  sum, on the resolver    0 rad
 position_error        θ_m [rad]                                                  sum, on the angle only  0 rad
+inertia_share         θ_m [rad]                                                  sum, of the inertia     0
+inertia_slope         the same                                                   sum, its slope          0 1/rad
 ====================  =========================================================  ======================  ========
 
 ΔT is the winding temperature less `T_REFERENCE`. The speed of a resolver has the slope of its angle's error; an error
-on the angle only leaves a speed from another sensor as it is. What drifts, the axis model has. A tabulated torque is a
+on the angle only leaves a speed from another sensor as it is. What drifts, and an inertia that changes with the angle,
+the axis model has. A tabulated torque is a
 shaft torque that costs a fifth of a step.
 A kernel is compiled with those parts of the library only that its runs need (`ema.models.parts`). An effect without
 laws is *structural*: the model itself reads its parameters (a delay, a dead time, a second inertia).
@@ -51,6 +54,8 @@ HOOKS = MappingProxyType(
         "inductance_factor": ("product", 1),
         "angle_error": ("sum", 1),
         "position_error": ("sum", 1),
+        "inertia_share": ("sum", 1),
+        "inertia_slope": ("sum", 1),
     }
 )
 

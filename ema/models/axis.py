@@ -37,6 +37,11 @@ class Model:
     lines: Array
     terms: Array
 
+    @property
+    def inertia(self) -> float:
+        """The mean over the angle. [kg m² or kg]"""
+        return float(self.z[row("J")] * (1.0 + self.z[row("inertia.change")]))
+
 
 def model(
     plant: Axis,
@@ -245,6 +250,13 @@ def true_state(numbers: Model, measured: Array, *, derived: bool) -> Array:
     return out
 
 
+def inertia_along(numbers: Model, theta: Array) -> Array:
+    """Inertia along a motion, shape (n,), as it changes with the angle. [kg m² or kg]"""
+    out = np.empty(len(theta))
+    kernel.inertia_along(numbers.z, theta, out)
+    return out
+
+
 def torque_along(
     numbers: Model,
     theta: Array,
@@ -256,7 +268,7 @@ def torque_along(
     *,
     force: bool = False,
 ) -> Array:
-    """Torque left to accelerate the axis along a measured motion, with a known `load`; of one shape. [N m or N]"""
+    """Torque that changes the momentum along a measured motion, with a known `load`; of one shape. [N m or N]"""
     out = np.empty(len(theta))
     kernel.torque_along(numbers.z, numbers.lines, numbers.terms, theta, w, i, t, dT, _known(load, t), force, out)
     return out

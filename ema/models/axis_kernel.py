@@ -8,6 +8,7 @@ A gear that gives (`gear_compliance`) takes the inertia J_l at the user out of J
 
     (J - J_l) dω_m/dt = … - T      J_l dω_l/dt = T      T = (θ_m - θ_l)/c + d (ω_m - ω_l)
 
+Where the inertia changes with the angle, J [1 + Δ(θ_m)], its momentum does: J [1 + Δ] dω_m/dt = … - ½ J dΔ/dθ ω_m².
 Where the angle is measured behind the gear (`drive_compliance`), what hangs to the spring is the motor,
 and the drive acts there. A known load τ_load was recorded, and acts on the side of the user.
 
@@ -21,7 +22,7 @@ import math
 
 from numba import njit
 
-from ema.effects import cogging, friction_memory, inverter_drop, supply_sag, torque_term
+from ema.effects import cogging, friction_memory, inverter_drop, registry, supply_sag, torque_term
 from ema.effects.dry_friction import rubbing_speed_after, speed_after
 
 from . import jit  # noqa: F401  (sets the cache folder before anything is compiled)
@@ -31,6 +32,7 @@ from .hooks import combined
 CURRENT, VOLTAGE, FORCE, SPEED_LOOP = range(4)
 # What a recorded drive does from one sample to the next; FAST: a speed loop acts there too, on a command that is held.
 STRAIGHT, HELD, HELD_BEFORE, FAST = range(4)
+LEAST = 0.02  # of the inertia that is left where it is measured
 CREEP = 1e-9  # [rad/s] at least, where the axis is known to slide
 OUTPUTS = ("theta_m", "w_m", "i_q", "u_q")
 
@@ -48,6 +50,8 @@ resistance_factor = combined("resistance_factor", "axis", row)
 inductance_factor = combined("inductance_factor", "axis", row)
 angle_error = combined("angle_error", "axis", row)
 position_error = combined("position_error", "axis", row)
+inertia_share = combined("inertia_share", "axis", row)
+inertia_slope = combined("inertia_slope", "axis", row)
 
 J, C, F_S, F_D, K_T, K_E, R, L = (row(name) for name in ("J", "C", "F_s", "F_d", "k_t", "k_e", "R", "L"))
 K_W, I_MAX, DT, LOAD = row("K_w"), row("I_max"), row("dT"), row("load")
@@ -63,6 +67,8 @@ assert [row(f"drive_compliance.{x}") - AT_MOTOR for x in _beyond] == [0, 1, 2, 3
 LOAD_SHARE, LOAD_SQUARE = row("output_load_friction.share"), row("quadratic_output_load_friction.per_torque")
 DEFLECTION, BRISTLE_DAMPING = row("friction_memory.deflection"), row("friction_memory.damping")
 SAG, V_DC = row("supply_sag.resistance"), row("V_dc")
+UNEVEN = [row(f"inertia_by_angle.{p.name}") for p in registry()["inertia_by_angle"].parameters]
+FIRST_UNEVEN, LAST_UNEVEN = min(UNEVEN), max(UNEVEN)
 
 
 @_inline
@@ -76,6 +82,15 @@ def torques(z, lines, terms, theta, w, i, t):
         if terms[k, 11] == 0.0:
             tau += torque_term.value(theta, w, i, t, terms[k])
     return tau
+
+
+@_inline
+def is_uneven(z):
+    """Whether the inertia changes with the angle."""
+    found = False
+    for k in range(FIRST_UNEVEN, LAST_UNEVEN + 1):
+        found = found or z[k] != 0.0
+    return found
 
 
 @_inline
@@ -157,7 +172,7 @@ def gear(z, inertia, h):
     first = AT_MOTOR if is_driven else AT_USER
     c, J_b = z[first], z[first + 1]
     J_a = inertia - J_b
-    if c <= 0.0 or J_a < 0.02 * inertia or h * h * inertia > c * J_a * J_b:
+    if c <= 0.0 or J_a < LEAST * inertia or h * h * inertia > c * J_a * J_b:
         return 0.0, 0.0, 0.0, 0.0, 0.0, False
     return 1.0 / c, 2.0 * z[first + 2] * math.sqrt(J_a * J_b / inertia / c), J_b, z[first + 3], z[first + 4], is_driven
 
@@ -247,7 +262,8 @@ def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide
     bristle, deflection = start[4], z[DEFLECTION]
     inertia = z[J] * (1.0 + z[INERTIA])
     stiffness, damping, J_b, drag, rubbing, is_driven = gear(z, inertia, h_max)
-    J_a = inertia - J_b
+    J_a = J_now = inertia - J_b
+    uneven = is_uneven(z)
     gain = 1.0 / (1.0 + z[GAIN])
     R_now = z[R] * resistance_factor(z, 0, 1, z[DT])
     skew = 1.0 + z[SKEW]
@@ -295,6 +311,9 @@ def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide
             if w_mid * w <= 0.0:
                 w_mid = w
             tau = (0.0 if is_driven else tau_m) - torques(z, lines, terms, theta_mid, w_mid, i, t_mid)
+            if uneven:
+                J_now = max(J_a + inertia * inertia_share(z, 0, 1, theta_mid), LEAST * inertia)
+                tau -= 0.5 * inertia * inertia_slope(z, 0, 1, theta_mid) * w_mid * w_mid
             if stiffness > 0.0:
                 T = stiffness * (theta_mid - theta_b - 0.5 * h * w_b) + damping * (w - w_b)
                 tau += -T if is_driven else z[LOAD] - T  # the load is beyond the gear too
@@ -305,15 +324,15 @@ def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide
                 theta_b += 0.5 * h * w_b
             w_sliding = w_mid if slide == 0.0 else slide * max(w_mid * slide, CREEP)
             F_s, F_d = friction(z, lines, terms, theta_mid, w_sliding, tau, tau_m, i, t_mid)
-            if friction_memory.is_slow(F_d, deflection, J_a, h):
+            if friction_memory.is_slow(F_d, deflection, J_now, h):
                 bristle = friction_memory.built_up(bristle, 0.5 * h * w, deflection)
-                tau -= friction_memory.torque(bristle, w, F_d, deflection, z[BRISTLE_DAMPING], J_a)
-                w_next = w + tau * h / J_a
+                tau -= friction_memory.torque(bristle, w, F_d, deflection, z[BRISTLE_DAMPING], J_now)
+                w_next = w + tau * h / J_now
                 bristle = friction_memory.built_up(bristle, 0.5 * h * w_next, deflection)
             elif slide == 0.0:
-                w_next = speed_after(w, tau, F_s, F_d, h / J_a)
+                w_next = speed_after(w, tau, F_s, F_d, h / J_now)
             else:
-                w_next = w + (tau - F_d * slide) * h / J_a
+                w_next = w + (tau - F_d * slide) * h / J_now
             theta += 0.5 * h * (w + w_next)
             dw = w_next - w
             w = w_next
@@ -396,13 +415,23 @@ def undo_angle_error(z, measured, of_position, out):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
+def inertia_along(z, theta, out):
+    """Inertia, with what the angle makes of it, along a motion."""
+    inertia = z[J] * (1.0 + z[INERTIA])
+    for k in range(theta.shape[0]):
+        out[k] = inertia * (1.0 + inertia_share(z, 0, 1, theta[k]))
+
+
+@njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
 def torque_along(z, lines, terms, theta, w, i, t, dT, load, is_force, out):
-    """Accelerating torque the model sees along a measured motion: drive less everything that opposes it."""
+    """What changes the momentum J [1 + Δ(θ)] ω along a measured motion: the drive less everything that opposes it."""
     bristle = 1.0 if w[0] > 0.0 else -1.0
+    inertia = z[J] * (1.0 + z[INERTIA])
     for k in range(theta.shape[0]):
         z[DT], z[LOAD] = dT[k], load[k]
         tau_m = i[k] if is_force else z[K_T] * emf_factor(z, 0, 1, i[k], z[DT]) * i[k]
         tau = tau_m - torques(z, lines, terms, theta[k], w[k], i[k], t[k])
+        tau += 0.5 * inertia * inertia_slope(z, 0, 1, theta[k]) * w[k] * w[k]
         _, F_d = friction(z, lines, terms, theta[k], w[k], tau, tau_m, i[k], t[k])
         if z[DEFLECTION] == 0.0 or (k > 0 and t[k] < t[k - 1]):
             bristle = 1.0 if w[k] > 0.0 else -1.0

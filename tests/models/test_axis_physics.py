@@ -48,6 +48,22 @@ def test_dry_friction_stops_a_free_axis_after_the_braking_distance_and_holds_it(
     assert out[0, -1] == pytest.approx(2e-5 * 50.0**2 / (2.0 * 0.01), rel=2e-3)
 
 
+def test_an_inertia_that_changes_with_the_angle_keeps_its_energy_and_takes_work_as_any_other():
+    """½ J [1 + Δ(θ)] ω² of a crank that runs free; with a constant torque it grows by the torque times the way."""
+    crank = {"once_cosine": 0.2, "once_sine": -0.1, "twice_cosine": -0.3, "twice_sine": 0.15}
+
+    def energy(out):
+        th = out[0]
+        by_angle = 0.2 * np.cos(th) - 0.1 * np.sin(th) - 0.3 * np.cos(2.0 * th) + 0.15 * np.sin(2.0 * th)
+        return 0.5 * 2e-5 * (1.0 + by_angle) * out[1] ** 2
+
+    free = run(FREE, "current", np.zeros(len(T)), effects={"inertia_by_angle": crank}, start=(0.4, 40.0), h=2e-5)
+    assert np.ptp(free[1]) > 20.0
+    np.testing.assert_allclose(energy(free), energy(free)[0], rtol=2e-3)
+    driven = run(FREE, "current", np.full(len(T), 0.1), effects={"inertia_by_angle": crank}, start=(0.4, 40.0), h=2e-5)
+    np.testing.assert_allclose(energy(driven), energy(driven)[0] + 0.05 * 0.1 * (driven[0] - 0.4), rtol=2e-3)
+
+
 def test_viscous_drag_and_spring_give_exponential_and_oscillation():
     out = run(FREE, "current", np.zeros(len(T)), effects={"viscous_drag": {"coefficient": 1e-4}}, start=(0.0, 10.0))
     np.testing.assert_allclose(out[1], 10.0 * np.exp(-1e-4 / 2e-5 * T), rtol=1e-3)

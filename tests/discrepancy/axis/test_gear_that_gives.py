@@ -120,7 +120,7 @@ def test_a_motor_that_drives_a_measured_load_through_a_spring(support, behind):
 
 
 def test_a_load_that_a_slipping_clutch_drags_along_is_behind_a_gear_that_creeps(support):
-    """No spring, a torque by the difference of the speeds alone: an inertia that follows the motor, and never swings."""
+    """A torque by the difference of the speeds alone: what hangs behind it follows the motor, and never swings."""
     strange = support("strange")
     axis = strange.Axis()
     rng = np.random.default_rng(3)

@@ -158,7 +158,6 @@ def bump(half: int, power: int = 4) -> tuple[Array, Array, Array]:
 def _moving(plant: Measured, model: axis.Model, j: int, offset: int, zero: float) -> tuple[Weak, tuple[Array, ...]]:
     p, w, b = plant.plant, plant.windows[j], plant.bench_of(j)
     z = model.z
-    J = z[row("J")] * (1.0 + z[row("inertia.change")])
     dt = w.period * (1.0 + z[row("clock_skew.rate")])
     late = z[row("position_delay.time")], z[row("speed_delay.time")]
     theta = np.interp(w.t + late[0], w.t, w.position)
@@ -172,6 +171,7 @@ def _moving(plant: Measured, model: axis.Model, j: int, offset: int, zero: float
     )
     i, k_t = _current(b, w, drive, speed, z)
     dT = np.full(w.n, w.dT)
+    J = model.inertia
     known = axis.torque_along(model, theta + zero, speed, i, w.t, dT, w.load, force=b.roles.kind == "force")
     sigma_w = b.noise[b.roles.speed].sigma if b.roles.speed else 0.0
     sigma_theta = b.noise[str(b.roles.position)].sigma if not b.roles.speed else 0.0
@@ -195,7 +195,9 @@ def _moving(plant: Measured, model: axis.Model, j: int, offset: int, zero: float
     else:
         position = w.outputs[b.roles.outputs.index(str(b.roles.position))]
         inertia = (np.interp(w.t + late[0], w.t, position)[index] @ second) / dt**2
-    y = known[index] @ phi - J * inertia
+    by_angle = axis.inertia_along(model, theta + zero) - J
+    uneven = -(by_angle * speed)[index] @ first / dt  # of the momentum, what is not the mean inertia's
+    y = known[index] @ phi - J * inertia - uneven
     steady = (np.sign(speed[index]) == np.sign(speed[centres])[:, None]).all(axis=1)  # no reversal, no standstill
     steady &= np.abs(speed[centres]) > 2.0 * sigma_w / np.sqrt(half)
     piece = _piece(y, np.full(len(y), noise), inertia, index + offset, np.tile(phi, (len(y), 1)), j)[steady]

@@ -12,6 +12,7 @@ from numpy.polynomial.chebyshev import chebvander
 from ema.core.records import Array
 from ema.discrepancy.axis.naming.linear import in_metres
 from ema.effects.flux_ripple import EFFECT as FLUX_RIPPLE
+from ema.effects.inertia_by_angle import EFFECT as INERTIA
 from ema.effects.position_friction import EFFECT as STRETCH
 from ema.effects.position_friction import FORMS, fading
 from ema.effects.position_line import EFFECT as POSITION_LINE
@@ -19,7 +20,7 @@ from ema.effects.stiffening_spring import EFFECT, bends, tilts
 
 from .law import BY_RECORD, Acting, Columns, Law, Values, one
 from .motion import Motion
-from .units import LINEAR, Units
+from .units import LINEAR, Units, of_base
 
 N_PLACES, N_ORDERS = 12, 320  # members of a family
 LEAST_TURN = 0.3  # [rad] of travel that shows a sine of the angle apart from a straight line
@@ -47,18 +48,9 @@ def by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[L
     if not linear:
         yield from (_pendulum(u, turns) for turns in dict.fromkeys((1.0, m.turns)) if turns * span > LEAST_TURN)
     if not linear and span > LEAST_TURN:
-        yield Law(
-            "friction once per turn",
-            "friction once per turn",
-            "friction_line",
-            lambda m, _: (m.direction * np.cos(m.theta), m.direction * np.sin(m.theta)),
-            {"amplitude": u.torque, "phase": "rad"},
-            _of_line(0.0),
-            f"friction varies by {{amplitude:.3g}} {u.torque} once per turn",
-            "slow motion over several turns",
-            is_friction=True,
-            n_columns=2,
-        )
+        yield from (_friction_line(n, u) for n in (1, 2))
+        if moves:
+            yield _inertia_by_angle(u)
     yield from _gear_lines(m, span, u)
     yield from _lines(span, u, linear=linear, but=m.gear_orders)
     if moves and not linear:
@@ -90,6 +82,55 @@ def by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[L
     for width, flatness in product(STRETCHES, FORMS):
         for at in np.linspace(float(m.theta.min()), float(m.theta.max()), N_PLACES):
             yield _stretch(float(at), width * span, flatness, span / N_PLACES, u)
+
+
+def _friction_line(n: int, u: Units) -> Law:
+    """What rubs once or twice per turn: a bent shaft, a bearing that is not round."""
+    often = ("once", "twice")[n - 1]
+    return Law(
+        "friction by the angle",
+        f"friction {often} per turn",
+        "friction_line",
+        lambda m, _: tuple(m.direction * wave for wave in m.waves(n)),
+        {"amplitude": u.torque, "phase": "rad"},
+        _of_line(0.0),
+        f"friction varies by {{amplitude:.3g}} {u.torque} {often} per turn",
+        "slow motion over several turns",
+        is_friction=True,
+        n_columns=2,
+    )
+
+
+def _inertia_by_angle(u: Units) -> Law:
+    """J_n cos nθ and J_n sin nθ of order one and two, of the momentum and of what the slope of the inertia makes."""
+
+    def columns(m: Motion, _: Acting) -> tuple[Array, ...]:
+        return tuple(wave * m.a + 0.5 * slope * m.w**2 for n in (1, 2) for wave, slope in _wave_and_slope(m, n))
+
+    def weak(m: Motion) -> list[tuple[Array, Array]]:
+        """d(Δ ω)/dt = Δ dω/dt + dΔ/dθ ω²"""
+        return [(-0.5 * slope * m.w**2, wave * m.w) for n in (1, 2) for wave, slope in _wave_and_slope(m, n)]
+
+    inertia = of_base(u)["inertia"]
+    return Law(
+        INERTIA.name,
+        INERTIA.name,
+        INERTIA.name,
+        columns,
+        dict.fromkeys((p.name for p in INERTIA.parameters), inertia),
+        lambda c: dict(zip((p.name for p in INERTIA.parameters), map(float, c), strict=True)),
+        f"the inertia changes with the angle: once ({{once_cosine:+.2g}}, {{once_sine:+.2g}} {inertia}) "
+        f"and twice ({{twice_cosine:+.2g}}, {{twice_sine:+.2g}} {inertia}) per turn, as with a crank or a linkage",
+        INERTIA.separated_by,
+        n_columns=4,
+        weak=weak,
+    )
+
+
+def _wave_and_slope(m: Motion, n: int) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """cos nθ and sin nθ, each with its derivative by the angle."""
+    c, s = m.waves(n)
+    return (c, -n * s), (s, n * c)
 
 
 def _stretch(at: float, width: float, flatness: float, apart: float, u: Units) -> Law:

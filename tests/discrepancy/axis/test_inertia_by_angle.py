@@ -1,0 +1,58 @@
+"""What an angle makes of inertia and friction: a crank, and a shaft that rubs twice per turn, by another simulator."""
+
+from __future__ import annotations
+
+import numpy as np
+import on_paper
+import pytest
+
+from ema.discrepancy.axis.balance.telling.telling import describe
+from ema.discrepancy.axis.finding.between import examine_ways
+from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.models.axis_config import RotaryAxis
+
+SHARE, PHASE = 0.25, 0.7  # of the inertia, twice per turn
+
+
+def crank(t, theta, w):
+    """J_2 cos(2θ + φ) d²θ/dt² - J_2 sin(2θ + φ) (dθ/dt)²"""
+    a = on_paper.Swing().at(t)[2]
+    return SHARE * on_paper.J * (np.cos(2.0 * theta + PHASE) * a - np.sin(2.0 * theta + PHASE) * w**2)
+
+
+def test_the_balance_tells_a_crank_with_its_sizes():
+    (term,) = describe(on_paper.plant(on_paper.cycle(crank)).balance, linear=False)["terms"]
+    assert term["name"] == "inertia_by_angle"
+    assert term["confidence"] > 0.9
+    found = {name: q["value"] / on_paper.J for name, q in term["parameters"].items()}
+    assert found["twice_cosine"] == pytest.approx(SHARE * np.cos(PHASE), abs=0.02)
+    assert found["twice_sine"] == pytest.approx(-SHARE * np.sin(PHASE), abs=0.02)
+    assert (found["once_cosine"], found["once_sine"]) == pytest.approx((0.0, 0.0), abs=0.02)
+
+
+def test_the_balance_tells_friction_twice_per_turn_and_no_ripple_of_the_motor():
+    """Where friction is most of what the motor gives, a torque constant that ripples takes most of it."""
+
+    def rubs(t, theta, w):
+        return 0.4 * on_paper.F_D * np.cos(2.0 * theta + PHASE) * np.sign(w)
+
+    (term,) = describe(on_paper.plant(on_paper.cycle(rubs)).balance, linear=False)["terms"]
+    assert term["name"] == "friction_line"
+    assert term["parameters"]["amplitude"]["value"] == pytest.approx(0.4 * on_paper.F_D, rel=0.05)
+
+
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.further)])
+def test_a_crank_is_named_by_free_runs_and_no_resolver(support, seed):
+    """A speed that ripples in proportion to itself: a resolver that errs twice per turn takes most of it."""
+    strange = support("strange")
+    axis = strange.Axis()
+    record = strange.record("crank", axis, seed, seconds=5.0)
+    outcome = examine_ways(AxisPlant(RotaryAxis.model_validate(strange.plant(axis)), [record], n_threads=1))
+    (effect,) = outcome.effects
+    assert effect["name"] == "inertia_by_angle"
+    assert effect["confidence"] > 0.9
+    rng = np.random.default_rng(seed)
+    rng.uniform(0.0, 6.0, 3)  # phases of the reference, which `record` draws first
+    amplitude, _, phase = strange.sizes(strange.CRANK, axis, rng)
+    for part, truth in (("twice_cosine", np.cos(phase)), ("twice_sine", -np.sin(phase))):
+        assert effect["parameters"][part]["value"] == pytest.approx(amplitude * truth, abs=0.03)
