@@ -35,6 +35,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from string import Formatter
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
@@ -159,8 +160,15 @@ class Effect:
 
     @property
     def multiplies_friction(self) -> bool:
-        """Whether its first parameter is a share of dry friction, which means nothing where there is next to none."""
+        """Whether it is a share of dry friction, which means nothing where there is next to none."""
         return bool(self.laws) and all(hook.endswith("_friction") for hook in self.laws)
+
+    @property
+    def shares_of_friction(self) -> tuple[str, ...]:
+        """Parameters that are shares of dry friction: those that the sentence names without a format of their own."""
+        if not self.multiplies_friction:
+            return ()
+        return tuple(name for _, name, how, _ in Formatter().parse(self.sentence) if name and not how)
 
     @property
     def is_table(self) -> bool:
@@ -181,7 +189,6 @@ class Effect:
         full = {**neutral, **values}
         besides = [text for name, text in self.besides.items() if full[name] != neutral[name]]
         told: dict[str, float | str] = {**full, **{name: of(full) for name, of in self.derived.items()}}
-        if self.multiplies_friction:
-            name = self.parameters[0].name
+        for name in self.shares_of_friction:
             told[name] = f"{100.0 * full[name]:.3g}%" if friction is None else f"{full[name] * friction:.3g} N m"
         return (self.sentence + " and".join(besides)).format(**told)

@@ -17,9 +17,11 @@ from ema.core.records import Cycle, Record
 FINE, HZ = 50, 1000
 KINDS = (
     *("nothing", "cushion", "gap", "maxwell_slip", "current_ripple", "friction_twice", "crank", "heat", "clutch"),
-    *("current_lag", "one_way_fan", "gusts", "load_step"),
+    *("current_lag", "one_way_fan", "gusts", "load_step", "dwell", "centrifugal"),
 )
-(NOTHING, CUSHION, GAP, SLIP, RIPPLE, TWICE, CRANK, HEAT, CLUTCH, LAG, FAN, GUSTS, STEP) = range(len(KINDS))
+(NOTHING, CUSHION, GAP, SLIP, RIPPLE, TWICE, CRANK, HEAT, CLUTCH, LAG, FAN, GUSTS, STEP, DWELL, BRAKE) = range(
+    len(KINDS)
+)
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,8 @@ def sizes(kind: int, axis: Axis, rng: np.random.Generator) -> tuple[float, float
         FAN: (rng.uniform(0.4, 0.9) * F / 20.0**2, 0.0, 0.0),
         GUSTS: (rng.uniform(0.2, 0.4) * F, 0.05, 0.0),  # rms, correlation time [s]
         STEP: (rng.uniform(0.2, 0.5) * F, rng.uniform(0.35, 0.65), 0.0),  # torque, when [of the record]
+        DWELL: (rng.uniform(0.5, 1.5), rng.uniform(0.02, 0.1), 0.0),  # share that rest adds, over this time [s]
+        BRAKE: (rng.uniform(0.1, 0.3) * F, rng.uniform(8.0, 14.0), 0.0),  # torque per speed beyond this one [rad/s]
     }[kind]
 
 
@@ -58,7 +62,7 @@ def _run(reference, kind, axis, q, gusts, loop, out):
     J, F, C, k_t = axis
     a, b, c = q
     theta, w, i_true = reference[0], 0.0, 0.0
-    theta_l, w_l, work = theta, 0.0, 0.0
+    theta_l, w_l, work, rested = theta, 0.0, 0.0, 0.0
     z = np.zeros(3)
     own = 1.0 - b if kind in (GAP, CLUTCH) else 1.0  # share of the inertia that is the motor's
     dt = 1.0 / (HZ * FINE)
@@ -106,6 +110,11 @@ def _run(reference, kind, axis, q, gusts, loop, out):
                 other += gusts[k]
             elif kind == STEP:
                 other += a if k > b * n else 0.0
+            elif kind == DWELL:
+                rested = rested + dt if w == 0.0 else 0.0
+                rubs *= 1.0 + a * (1.0 - np.exp(-rested / b))
+            elif kind == BRAKE:
+                other += a * np.sign(w) * max(abs(w) - b, 0.0)
             free = w + dt / inertia * (motor - other)
             stop = dt / inertia * rubs
             w = 0.0 if abs(free) <= stop else free - np.sign(free) * stop

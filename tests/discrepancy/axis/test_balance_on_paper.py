@@ -51,7 +51,7 @@ def test_the_weak_form_of_linked_axes_is_the_strong_one(neighbour):
         assert (f + np.gradient(p, m.t))[5:-5] == pytest.approx(column[5:-5], abs=2e-3 * np.abs(column).max() + 1e-9)
 
 
-ON_PAPER = ["constant", "quadratic drag", "spring", "pendulum", "line 5", "gear line 7.3", "friction twice per turn"]
+ON_PAPER = ["constant", "quadratic drag", "spring", "pendulum", "line 5", "gear line 7.3", "friction_by_angle"]
 
 
 def test_the_weak_form_of_an_inertia_that_changes_with_the_angle_is_the_strong_one():

@@ -10,6 +10,7 @@ import numpy as np
 from ema.discrepancy.axis.reading.sizes import sizes
 from ema.discrepancy.axis.scanning.cogging import cogging_candidate
 from ema.discrepancy.axis.scanning.fading import fading_candidate
+from ema.discrepancy.axis.scanning.rubbing import rubbing_candidate
 from ema.discrepancy.axis.scanning.stretch import stretch_candidate
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
@@ -54,6 +55,7 @@ def library(plant: Measured, point: Point, blocks: Sequence[int]) -> list[Candid
         gear_candidate(plant, point, blocks),
         stretch_candidate(plant, s, point, blocks),
         fading_candidate(plant, s, point, blocks),
+        rubbing_candidate(plant, s, point, blocks),
     )
     return [*found, *(c for c in searched if c is not None)]
 

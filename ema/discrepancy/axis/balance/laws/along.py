@@ -12,7 +12,9 @@ from numpy.polynomial.chebyshev import chebvander
 from ema.core.records import Array
 from ema.discrepancy.axis.naming.linear import in_metres
 from ema.effects.flux_ripple import EFFECT as FLUX_RIPPLE
+from ema.effects.friction_by_angle import EFFECT as FRICTION
 from ema.effects.inertia_by_angle import EFFECT as INERTIA
+from ema.effects.per_turn import ORDERS, PARTS
 from ema.effects.position_friction import EFFECT as STRETCH
 from ema.effects.position_friction import FORMS, fading
 from ema.effects.position_line import EFFECT as POSITION_LINE
@@ -48,7 +50,7 @@ def by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[L
     if not linear:
         yield from (_pendulum(u, turns) for turns in dict.fromkeys((1.0, m.turns)) if turns * span > LEAST_TURN)
     if not linear and span > LEAST_TURN:
-        yield from (_friction_line(n, u) for n in (1, 2))
+        yield _friction_by_angle(u)
         if moves:
             yield _inertia_by_angle(u)
     yield from _gear_lines(m, span, u)
@@ -84,32 +86,36 @@ def by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[L
             yield _stretch(float(at), width * span, flatness, span / N_PLACES, u)
 
 
-def _friction_line(n: int, u: Units) -> Law:
-    """What rubs once or twice per turn: a bent shaft, a bearing that is not round."""
-    often = ("once", "twice")[n - 1]
+def _friction_by_angle(u: Units) -> Law:
+    """What rubs once and twice per turn."""
     return Law(
-        "friction by the angle",
-        f"friction {often} per turn",
-        "friction_line",
-        lambda m, _: tuple(m.direction * wave for wave in m.waves(n)),
-        {"amplitude": u.torque, "phase": "rad"},
-        _of_line(0.0),
-        f"friction varies by {{amplitude:.3g}} {u.torque} {often} per turn",
-        "slow motion over several turns",
+        FRICTION.name,
+        FRICTION.name,
+        FRICTION.name,
+        lambda m, _: tuple(m.direction * wave for n in ORDERS for wave in m.waves(n)),
+        dict.fromkeys(PARTS, u.torque),
+        _per_turn,
+        f"friction changes with the angle: once ({{once_cosine:+.2g}}, {{once_sine:+.2g}} {u.torque}) and twice "
+        f"({{twice_cosine:+.2g}}, {{twice_sine:+.2g}} {u.torque}) per turn",
+        FRICTION.separated_by,
         is_friction=True,
-        n_columns=2,
+        n_columns=len(PARTS),
     )
+
+
+def _per_turn(c: Array) -> Mapping[str, float]:
+    return dict(zip(PARTS, map(float, c), strict=True))
 
 
 def _inertia_by_angle(u: Units) -> Law:
     """J_n cos nθ and J_n sin nθ of order one and two, of the momentum and of what the slope of the inertia makes."""
 
     def columns(m: Motion, _: Acting) -> tuple[Array, ...]:
-        return tuple(wave * m.a + 0.5 * slope * m.w**2 for n in (1, 2) for wave, slope in _wave_and_slope(m, n))
+        return tuple(wave * m.a + 0.5 * slope * m.w**2 for n in ORDERS for wave, slope in _wave_and_slope(m, n))
 
     def weak(m: Motion) -> list[tuple[Array, Array]]:
         """d(Δ ω)/dt = Δ dω/dt + dΔ/dθ ω²"""
-        return [(-0.5 * slope * m.w**2, wave * m.w) for n in (1, 2) for wave, slope in _wave_and_slope(m, n)]
+        return [(-0.5 * slope * m.w**2, wave * m.w) for n in ORDERS for wave, slope in _wave_and_slope(m, n)]
 
     inertia = of_base(u)["inertia"]
     return Law(
@@ -117,12 +123,12 @@ def _inertia_by_angle(u: Units) -> Law:
         INERTIA.name,
         INERTIA.name,
         columns,
-        dict.fromkeys((p.name for p in INERTIA.parameters), inertia),
-        lambda c: dict(zip((p.name for p in INERTIA.parameters), map(float, c), strict=True)),
+        dict.fromkeys(PARTS, inertia),
+        _per_turn,
         f"the inertia changes with the angle: once ({{once_cosine:+.2g}}, {{once_sine:+.2g}} {inertia}) "
         f"and twice ({{twice_cosine:+.2g}}, {{twice_sine:+.2g}} {inertia}) per turn, as with a crank or a linkage",
         INERTIA.separated_by,
-        n_columns=4,
+        n_columns=len(PARTS),
         weak=weak,
     )
 

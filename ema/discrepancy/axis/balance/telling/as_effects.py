@@ -12,6 +12,7 @@ from ema.discrepancy.axis.balance.laws.law import Law
 from ema.discrepancy.axis.balance.regressing.found import Balance, Term, draw_law
 from ema.discrepancy.axis.naming.naming import line
 from ema.discrepancy.plant import Point
+from ema.effects.per_turn import PARTS
 from ema.effects.stiffening_spring import EFFECT
 from ema.models.axis_config import LINES
 
@@ -121,6 +122,10 @@ def _as_it_is(name: str, *parameters: str) -> _Maker:
     return _Maker(lambda v, _, __: {name: {p: v[p] for p in parameters}})
 
 
+def _friction_by_angle(v: Values, F_d: float, k_t: float) -> Effects:
+    return {"friction_by_angle": {part: v[part] / F_d for part in PARTS}}
+
+
 def _of_friction(name: str, parameter: str, of: str, *beside: str) -> _Maker:
     """`parameter` is the law's value `of` over dry friction; what is `beside` is as it is."""
     return _Maker(lambda v, F_d, _: {name: {parameter: v[of] / F_d, **{p: v[p] for p in beside}}}, is_relative=True)
@@ -177,6 +182,7 @@ _MAKERS: Mapping[str, _Maker] = {
     "cogging": _as_it_is("cogging", "amplitude", "order", "phase"),
     "position_line": _as_it_is("position_line", "amplitude", "order", "phase"),
     "gear_error": _as_it_is("gear_error", "amplitude", "order", "phase"),
+    "friction_by_angle": _Maker(_friction_by_angle, is_relative=True),
     "load_friction": _of_friction("load_friction", "per_torque", "share"),
     "friction_slope": _of_friction("friction_slope", "slope", "slope", "centre"),
     "stribeck": _of_friction("stribeck", "excess", "more", "speed", "shape"),

@@ -9,9 +9,11 @@ import pytest
 from ema.discrepancy.axis.balance.telling.telling import describe
 from ema.discrepancy.axis.finding.between import examine_ways
 from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.axis.reading.sizes import sizes
+from ema.discrepancy.axis.scanning.rubbing import rubbing_candidate
 from ema.models.axis_config import RotaryAxis
 
-SHARE, PHASE = 0.25, 0.7  # of the inertia, twice per turn
+SHARE, RUBS, PHASE = 0.25, 0.4, 0.7  # of the inertia, and of dry friction, twice per turn
 
 
 def crank(t, theta, w):
@@ -30,15 +32,29 @@ def test_the_balance_tells_a_crank_with_its_sizes():
     assert (found["once_cosine"], found["once_sine"]) == pytest.approx((0.0, 0.0), abs=0.02)
 
 
+def rubs(t, theta, w):
+    """F_2 cos(2θ + φ) against the motion"""
+    return RUBS * on_paper.F_D * np.cos(2.0 * theta + PHASE) * np.sign(w)
+
+
 def test_the_balance_tells_friction_twice_per_turn_and_no_ripple_of_the_motor():
     """Where friction is most of what the motor gives, a torque constant that ripples takes most of it."""
-
-    def rubs(t, theta, w):
-        return 0.4 * on_paper.F_D * np.cos(2.0 * theta + PHASE) * np.sign(w)
-
     (term,) = describe(on_paper.plant(on_paper.cycle(rubs)).balance, linear=False)["terms"]
-    assert term["name"] == "friction_line"
-    assert term["parameters"]["amplitude"]["value"] == pytest.approx(0.4 * on_paper.F_D, rel=0.05)
+    assert term["name"] == "friction_by_angle"
+    found = {name: q["value"] / on_paper.F_D for name, q in term["parameters"].items()}
+    assert found["twice_cosine"] == pytest.approx(RUBS * np.cos(PHASE), abs=0.02)
+    assert found["twice_sine"] == pytest.approx(-RUBS * np.sin(PHASE), abs=0.02)
+
+
+def test_a_fit_of_friction_that_changes_over_a_turn_begins_near_it():
+    plant = on_paper.plant(on_paper.cycle(rubs), F_d=0.8 * on_paper.F_D)
+    at, every = {"F_d": 0.8 * on_paper.F_D}, on_paper.everywhere(plant)
+    found = rubbing_candidate(plant, sizes(plant), at, every)
+    (start,) = found.starts
+    assert start["F_d"] == pytest.approx(on_paper.F_D, rel=0.05)
+    assert start["friction_by_angle.twice_cosine"] == pytest.approx(RUBS * np.cos(PHASE), abs=0.05)
+    assert start["friction_by_angle.twice_sine"] == pytest.approx(-RUBS * np.sin(PHASE), abs=0.05)
+    assert rubbing_candidate(plant, sizes(plant), start, every) is None
 
 
 @pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.further)])
