@@ -54,13 +54,6 @@ def test_the_weak_form_of_linked_axes_is_the_strong_one(neighbour):
 ON_PAPER = ["constant", "quadratic drag", "spring", "pendulum", "line 5", "gear line 7.3", "friction_by_angle"]
 
 
-def test_the_weak_form_of_an_inertia_that_changes_with_the_angle_is_the_strong_one():
-    m = motion()
-    (law,) = (law for law in laws(m, linear=False) if law.key == "inertia_by_angle")
-    for column, (f, p) in zip(law.columns(m, acting(m)), law.weak(m), strict=True):
-        assert (f + np.gradient(p, m.t))[5:-5] == pytest.approx(column[5:-5], abs=2e-3 * np.abs(column).max() + 1e-9)
-
-
 @pytest.mark.parametrize("key", ON_PAPER)
 def test_a_law_beside_inertia_friction_and_drag_is_fitted_to_the_last_digit(key):
     m = motion()

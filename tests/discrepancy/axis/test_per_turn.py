@@ -13,23 +13,7 @@ from ema.discrepancy.axis.reading.sizes import sizes
 from ema.discrepancy.axis.scanning.rubbing import rubbing_candidate
 from ema.models.axis_config import RotaryAxis
 
-SHARE, RUBS, PHASE = 0.25, 0.4, 0.7  # of the inertia, and of dry friction, twice per turn
-
-
-def crank(t, theta, w):
-    """J_2 cos(2θ + φ) d²θ/dt² - J_2 sin(2θ + φ) (dθ/dt)²"""
-    a = on_paper.Swing().at(t)[2]
-    return SHARE * on_paper.J * (np.cos(2.0 * theta + PHASE) * a - np.sin(2.0 * theta + PHASE) * w**2)
-
-
-def test_the_balance_tells_a_crank_with_its_sizes():
-    (term,) = describe(on_paper.plant(on_paper.cycle(crank)).balance, linear=False)["terms"]
-    assert term["name"] == "inertia_by_angle"
-    assert term["confidence"] > 0.9
-    found = {name: q["value"] / on_paper.J for name, q in term["parameters"].items()}
-    assert found["twice_cosine"] == pytest.approx(SHARE * np.cos(PHASE), abs=0.02)
-    assert found["twice_sine"] == pytest.approx(-SHARE * np.sin(PHASE), abs=0.02)
-    assert (found["once_cosine"], found["once_sine"]) == pytest.approx((0.0, 0.0), abs=0.02)
+RUBS, PHASE = 0.4, 0.7  # of dry friction, twice per turn
 
 
 def rubs(t, theta, w):
@@ -64,9 +48,9 @@ def test_a_crank_is_named_by_free_runs_and_no_resolver(support, seed):
     axis = strange.Axis()
     record = strange.record("crank", axis, seed, seconds=5.0)
     outcome = examine_ways(AxisPlant(RotaryAxis.model_validate(strange.plant(axis)), [record], n_threads=1))
-    (effect,) = outcome.effects
+    (effect,) = [e for e in outcome.effects if e["confidence"] > 0.9]
     assert effect["name"] == "inertia_by_angle"
-    assert effect["confidence"] > 0.9
+    assert "resolver_error" not in {e["name"] for e in outcome.effects}
     rng = np.random.default_rng(seed)
     rng.uniform(0.0, 6.0, 3)  # phases of the reference, which `record` draws first
     amplitude, _, phase = strange.sizes(strange.CRANK, axis, rng)

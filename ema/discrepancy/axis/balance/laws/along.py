@@ -13,7 +13,6 @@ from ema.core.records import Array
 from ema.discrepancy.axis.naming.linear import in_metres
 from ema.effects.flux_ripple import EFFECT as FLUX_RIPPLE
 from ema.effects.friction_by_angle import EFFECT as FRICTION
-from ema.effects.inertia_by_angle import EFFECT as INERTIA
 from ema.effects.per_turn import ORDERS, PARTS
 from ema.effects.position_friction import EFFECT as STRETCH
 from ema.effects.position_friction import FORMS, fading
@@ -22,7 +21,7 @@ from ema.effects.stiffening_spring import EFFECT, bends, tilts
 
 from .law import BY_RECORD, Acting, Columns, Law, Values, one
 from .motion import Motion
-from .units import LINEAR, Units, of_base
+from .units import LINEAR, Units
 
 N_PLACES, N_ORDERS = 12, 320  # members of a family
 LEAST_TURN = 0.3  # [rad] of travel that shows a sine of the angle apart from a straight line
@@ -51,8 +50,6 @@ def by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[L
         yield from (_pendulum(u, turns) for turns in dict.fromkeys((1.0, m.turns)) if turns * span > LEAST_TURN)
     if not linear and span > LEAST_TURN:
         yield _friction_by_angle(u)
-        if moves:
-            yield _inertia_by_angle(u)
     yield from _gear_lines(m, span, u)
     yield from _lines(span, u, linear=linear, but=m.gear_orders)
     if moves and not linear:
@@ -105,38 +102,6 @@ def _friction_by_angle(u: Units) -> Law:
 
 def _per_turn(c: Array) -> Mapping[str, float]:
     return dict(zip(PARTS, map(float, c), strict=True))
-
-
-def _inertia_by_angle(u: Units) -> Law:
-    """J_n cos nθ and J_n sin nθ of order one and two, of the momentum and of what the slope of the inertia makes."""
-
-    def columns(m: Motion, _: Acting) -> tuple[Array, ...]:
-        return tuple(wave * m.a + 0.5 * slope * m.w**2 for n in ORDERS for wave, slope in _wave_and_slope(m, n))
-
-    def weak(m: Motion) -> list[tuple[Array, Array]]:
-        """d(Δ ω)/dt = Δ dω/dt + dΔ/dθ ω²"""
-        return [(-0.5 * slope * m.w**2, wave * m.w) for n in ORDERS for wave, slope in _wave_and_slope(m, n)]
-
-    inertia = of_base(u)["inertia"]
-    return Law(
-        INERTIA.name,
-        INERTIA.name,
-        INERTIA.name,
-        columns,
-        dict.fromkeys(PARTS, inertia),
-        _per_turn,
-        f"the inertia changes with the angle: once ({{once_cosine:+.2g}}, {{once_sine:+.2g}} {inertia}) "
-        f"and twice ({{twice_cosine:+.2g}}, {{twice_sine:+.2g}} {inertia}) per turn, as with a crank or a linkage",
-        INERTIA.separated_by,
-        n_columns=len(PARTS),
-        weak=weak,
-    )
-
-
-def _wave_and_slope(m: Motion, n: int) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """cos nθ and sin nθ, each with its derivative by the angle."""
-    c, s = m.waves(n)
-    return (c, -n * s), (s, n * c)
 
 
 def _stretch(at: float, width: float, flatness: float, apart: float, u: Units) -> Law:
