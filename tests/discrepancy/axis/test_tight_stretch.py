@@ -17,7 +17,14 @@ def positioner(support) -> ModuleType:
     return support("positioner")
 
 
-@pytest.mark.parametrize(("low", "high", "more"), [(0.03, 0.14, 14.0), (0.06, 0.13, 14.0), (0.05, 0.13, -9.0)])
+STRETCHES = [
+    pytest.param(0.03, 0.14, 14.0, marks=pytest.mark.further),
+    pytest.param(0.06, 0.13, 14.0, marks=pytest.mark.further),
+    (0.05, 0.13, -9.0),
+]
+
+
+@pytest.mark.parametrize(("low", "high", "more"), STRETCHES)
 def test_where_a_guide_is_tight_and_by_how_much(positioner, low, high, more):
     bench = positioner.Table(tight=(low, high, more))
     plant = AxisPlant(LinearAxis.model_validate(positioner.table_plant(bench)), [positioner.table(bench, 3)])
