@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import geared
 import pytest
 
 from ema.core.records import Cycle, Record
+from ema.discrepancy.axis.finding import between
 from ema.discrepancy.axis.finding.between import examine_ways
 from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.models.axis_config import RotaryAxis
@@ -38,3 +40,16 @@ def test_a_torque_that_reads_too_much_is_no_heavier_axis(outcome):
 
 def test_a_held_drive_is_told(outcome):
     assert any("held until the next" in note for note in outcome.notes)
+
+
+def _outcome(left, *effects):
+    return SimpleNamespace(effects=effects, records=[SimpleNamespace(rms_before=40.0, rms_after=left)])
+
+
+@pytest.mark.parametrize(("one", "other", "is_taken"), [(2.0, 1.2, True), (2.0, 1.9, False), (0.8890, 0.8892, False)])
+def test_another_way_with_more_effects_is_taken_where_it_leaves_far_less_than_noise_makes(one, other, is_taken):
+    """A drive that is held leaves what noise makes, and so does one that runs straight and is late by half a sample.
+
+    Where the noise was told too large both leave less than one, and less than half of a negative rest was "far less".
+    """
+    assert between._is_simpler(_outcome(other, "drag", "late"), _outcome(one, "drag")) == is_taken
