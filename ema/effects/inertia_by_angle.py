@@ -10,8 +10,8 @@ from .search import AxisSizes, Span
 
 
 def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
-    """Where a search begins: of an axis that turns."""
-    return per_turn.spans(0.9, 0.01, 0.03) if s.turns and s.moves else None
+    """Where a search begins: of an axis that turns far enough."""
+    return per_turn.spans(0.9, 0.01, 0.03) if per_turn.is_shown(s) and s.moves else None
 
 
 EFFECT = Effect(

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from math import pi
+
 from .base import Parameter
-from .search import Span
+from .search import AxisSizes, Span
 from .vector_math import cos, sin
 
 ORDERS = (1, 2)  # of each a cosine and a sine part
 PARTS = ("once_cosine", "once_sine", "twice_cosine", "twice_sine")
+
+LEAST_TRAVEL = pi  # [rad] that shows what comes once per turn apart from a parabola along the travel
 
 
 def wave(theta_m, once_cosine, once_sine, twice_cosine, twice_sine):
@@ -27,6 +31,11 @@ def parameters(unit: str, of: str, most: float, start: float) -> tuple[Parameter
     """The four of them, within ±`most`."""
     said = {name: name.replace("_", " per mechanical turn, ") for name in PARTS}
     return tuple(Parameter(name, unit, 0.0, -most, most, start, f"{of}, {said[name]} part") for name in PARTS)
+
+
+def is_shown(s: AxisSizes) -> bool:
+    """Whether an axis turns far enough to show what comes once per turn."""
+    return s.turns and 2.0 * s.half_range > LEAST_TRAVEL
 
 
 def spans(most: float, start: float, scale: float) -> dict[str, Span]:

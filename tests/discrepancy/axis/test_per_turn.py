@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import on_paper
 import pytest
@@ -11,6 +13,7 @@ from ema.discrepancy.axis.finding.between import examine_ways
 from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.discrepancy.axis.reading.sizes import sizes
 from ema.discrepancy.axis.scanning.rubbing import rubbing_candidate
+from ema.effects import registry
 from ema.models.axis_config import RotaryAxis
 
 RUBS, PHASE = 0.4, 0.7  # of dry friction, twice per turn
@@ -39,6 +42,9 @@ def test_a_fit_of_friction_that_changes_over_a_turn_begins_near_it():
     assert start["friction_by_angle.twice_cosine"] == pytest.approx(RUBS * np.cos(PHASE), abs=0.05)
     assert start["friction_by_angle.twice_sine"] == pytest.approx(-RUBS * np.sin(PHASE), abs=0.05)
     assert rubbing_candidate(plant, sizes(plant), start, every) is None
+    swings = replace(sizes(plant), half_range=0.5)
+    assert rubbing_candidate(plant, swings, at, every) is None
+    assert registry()["inertia_by_angle"].on_axis(swings) is None
 
 
 @pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.further)])

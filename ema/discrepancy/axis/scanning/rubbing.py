@@ -12,7 +12,7 @@ import numpy as np
 
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects.friction_by_angle import EFFECT, MOST
-from ema.effects.per_turn import ORDERS, PARTS
+from ema.effects.per_turn import ORDERS, PARTS, is_shown
 
 from .weak_form import FEWEST, weak_form
 
@@ -24,8 +24,8 @@ SCALE = 0.03  # of dry friction: a change that matters
 
 
 def rubbing_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Sequence[int]) -> Candidate | None:
-    """What a regression beside friction, drag and inertia says, as a start; None where it is there or nothing turns."""
-    if not s.turns or any(name.startswith(EFFECT.name) for name in point):
+    """What a regression beside friction, drag and inertia says, as a start; None where it is there or unseen."""
+    if not is_shown(s) or any(name.startswith(EFFECT.name) for name in point):
         return None
     weak = weak_form(plant, point, blocks)
     if len(weak.y) < FEWEST:

@@ -13,7 +13,7 @@ from ema.core.records import Array
 from ema.discrepancy.axis.naming.linear import in_metres
 from ema.effects.flux_ripple import EFFECT as FLUX_RIPPLE
 from ema.effects.friction_by_angle import EFFECT as FRICTION
-from ema.effects.per_turn import ORDERS, PARTS
+from ema.effects.per_turn import LEAST_TRAVEL, ORDERS, PARTS
 from ema.effects.position_friction import EFFECT as STRETCH
 from ema.effects.position_friction import FORMS, fading
 from ema.effects.position_line import EFFECT as POSITION_LINE
@@ -48,7 +48,7 @@ def by_position(m: Motion, u: Units, *, moves: bool, linear: bool) -> Iterator[L
     yield _any(centre, 0.5 * span, u)
     if not linear:
         yield from (_pendulum(u, turns) for turns in dict.fromkeys((1.0, m.turns)) if turns * span > LEAST_TURN)
-    if not linear and span > LEAST_TURN:
+    if not linear and span > LEAST_TRAVEL:
         yield _friction_by_angle(u)
     yield from _gear_lines(m, span, u)
     yield from _lines(span, u, linear=linear, but=m.gear_orders)
