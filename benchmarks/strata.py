@@ -49,6 +49,7 @@ class Trial:
             "plant": self.plant,
             "record": self.record,
             "effects": list(hidden_effects(self.case)),
+            "there": list(self.made),
         }
 
     @property
