@@ -250,11 +250,11 @@ def true_state(numbers: Model, measured: Array, *, derived: bool) -> Array:
     return out
 
 
-def inertia_along(numbers: Model, theta: Array) -> Array:
-    """Inertia along a motion, shape (n,), as it changes with the angle. [kg m² or kg]"""
-    out = np.empty(len(theta))
-    kernel.inertia_along(numbers.z, theta, out)
-    return out
+def inertia_by_angle(numbers: Model, theta: Array) -> tuple[Array, Array]:
+    """What the angle adds to the inertia along a motion, and its slope; shape (n,). [kg m², kg m²/rad]"""
+    out = np.empty((2, len(theta)))
+    kernel.inertia_by_angle(numbers.z, theta, out)
+    return out[0], out[1]
 
 
 def torque_along(

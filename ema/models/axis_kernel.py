@@ -67,8 +67,7 @@ assert [row(f"drive_compliance.{x}") - AT_MOTOR for x in _beyond] == [0, 1, 2, 3
 LOAD_SHARE, LOAD_SQUARE = row("output_load_friction.share"), row("quadratic_output_load_friction.per_torque")
 DEFLECTION, BRISTLE_DAMPING = row("friction_memory.deflection"), row("friction_memory.damping")
 SAG, V_DC = row("supply_sag.resistance"), row("V_dc")
-UNEVEN = [row(f"inertia_by_angle.{p.name}") for p in registry()["inertia_by_angle"].parameters]
-FIRST_UNEVEN, LAST_UNEVEN = min(UNEVEN), max(UNEVEN)
+UNEVEN = tuple(row(f"inertia_by_angle.{p.name}") for p in registry()["inertia_by_angle"].parameters)
 
 
 @_inline
@@ -88,7 +87,7 @@ def torques(z, lines, terms, theta, w, i, t):
 def is_uneven(z):
     """Whether the inertia changes with the angle."""
     found = False
-    for k in range(FIRST_UNEVEN, LAST_UNEVEN + 1):
+    for k in UNEVEN:
         found = found or z[k] != 0.0
     return found
 
@@ -415,11 +414,12 @@ def undo_angle_error(z, measured, of_position, out):
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)
-def inertia_along(z, theta, out):
-    """Inertia, with what the angle makes of it, along a motion."""
+def inertia_by_angle(z, theta, out):
+    """What the angle adds to the inertia along a motion, and its slope; `out` of shape (2, n_times)."""
     inertia = z[J] * (1.0 + z[INERTIA])
     for k in range(theta.shape[0]):
-        out[k] = inertia * (1.0 + inertia_share(z, 0, 1, theta[k]))
+        out[0, k] = inertia * inertia_share(z, 0, 1, theta[k])
+        out[1, k] = inertia * inertia_slope(z, 0, 1, theta[k])
 
 
 @njit(error_model="numpy", fastmath=True, cache=True, nogil=True)

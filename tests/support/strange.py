@@ -24,6 +24,9 @@ KINDS = (
 )
 
 
+SINES = ((8.0, 0.25), (2.0, 0.9), (0.4, 2.7))  # of the reference: [rad], [Hz]
+
+
 @dataclass(frozen=True)
 class Axis:
     """Numbers of the axis at the motor's shaft."""
@@ -121,6 +124,12 @@ def _run(reference, kind, axis, q, gusts, loop, out):
             theta += dt * w
 
 
+def draw(kind: int, axis: Axis, rng: np.random.Generator) -> tuple[np.ndarray, tuple[float, float, float]]:
+    """Phases of the reference's sines, and `sizes`, as `record` has them of a generator of its seed."""
+    phases = rng.uniform(0.0, 6.0, len(SINES))
+    return phases, sizes(kind, axis, rng)
+
+
 def record(name: str, axis: Axis, seed: int, *, seconds: float = 8.0, stiff: float = 1.0) -> Record:
     """Three sines over some turns of the motor; `stiff`: factor on the speed loop's gain."""
     rng = np.random.default_rng(seed)
@@ -128,10 +137,10 @@ def record(name: str, axis: Axis, seed: int, *, seconds: float = 8.0, stiff: flo
     n = round(seconds * HZ)
     t = np.arange(n) / HZ
     reference = np.zeros(n)
-    for size, f in ((8.0, 0.25), (2.0, 0.9), (0.4, 2.7)):
-        reference += size * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0))
+    phases, q = draw(kind, axis, rng)
+    for (size, f), phase in zip(SINES, phases, strict=True):
+        reference += size * np.sin(2.0 * np.pi * f * t + phase)
     reference *= np.minimum(1.0, t / 0.3)
-    q = sizes(kind, axis, rng)
     gusts = np.zeros(n)
     if kind == GUSTS:
         fade = np.exp(-1.0 / (HZ * q[1]))

@@ -123,9 +123,7 @@ def test_a_load_that_a_slipping_clutch_drags_along_is_behind_a_gear_that_creeps(
     """A torque by the difference of the speeds alone: what hangs behind it follows the motor, and never swings."""
     strange = support("strange")
     axis = strange.Axis()
-    rng = np.random.default_rng(3)
-    rng.uniform(0.0, 6.0, 3)  # phases of the reference, which `record` draws first
-    damping, share, _ = strange.sizes(strange.CLUTCH, axis, rng)
+    _, (damping, share, _) = strange.draw(strange.CLUTCH, axis, np.random.default_rng(3))
     plant = AxisPlant(
         RotaryAxis.model_validate(strange.plant(axis)), [strange.record("clutch", axis, 3, seconds=4.0)], n_threads=1
     )

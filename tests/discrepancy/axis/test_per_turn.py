@@ -57,8 +57,6 @@ def test_a_crank_is_named_by_free_runs_and_no_resolver(support, seed):
     (effect,) = [e for e in outcome.effects if e["confidence"] > 0.9]
     assert effect["name"] == "inertia_by_angle"
     assert "resolver_error" not in {e["name"] for e in outcome.effects}
-    rng = np.random.default_rng(seed)
-    rng.uniform(0.0, 6.0, 3)  # phases of the reference, which `record` draws first
-    amplitude, _, phase = strange.sizes(strange.CRANK, axis, rng)
+    _, (amplitude, _, phase) = strange.draw(strange.CRANK, axis, np.random.default_rng(seed))
     for part, truth in (("twice_cosine", np.cos(phase)), ("twice_sine", -np.sin(phase))):
         assert effect["parameters"][part]["value"] == pytest.approx(amplitude * truth, abs=0.03)

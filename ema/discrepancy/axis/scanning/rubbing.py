@@ -14,7 +14,7 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects.friction_by_angle import EFFECT, MOST
 from ema.effects.per_turn import ORDERS, PARTS, is_shown
 
-from .weak_form import FEWEST, weak_form
+from .weak_form import FEWEST, bound_friction, fit_frictions, weak_form
 
 if TYPE_CHECKING:
     from ema.discrepancy.axis.reading.measured import Measured
@@ -32,10 +32,9 @@ def rubbing_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Seque
         return None
     theta, way = weak.motion.theta, np.sign(weak.motion.direction)
     columns = [weak.integrate(way * part(n * theta)) for n in ORDERS for part in (np.cos, np.sin)]
-    A = np.stack([*weak.always(), *columns], axis=1) / weak.sigma[:, None]
-    (_, everywhere, *_), own = np.split(np.linalg.lstsq(A, weak.y / weak.sigma, rcond=None)[0], [-len(PARTS)])
-    friction = next(f for f in plant.base if f.name == "F_d")
-    F_d = float(np.clip(point["F_d"] + everywhere, max(friction.low, 1e-3 * s.torque), friction.high))
+    always = np.stack(weak.always(), axis=1)
+    everywhere, own = fit_frictions(weak, always, np.stack(columns, axis=1) / weak.sigma[:, None])
+    F_d = bound_friction(plant, s, point, everywhere)
     start = {f"{EFFECT.name}.{part}": float(x) for part, x in zip(PARTS, np.clip(own / F_d, -MOST, MOST), strict=True)}
     units = {p.name: p.unit for p in EFFECT.parameters}
     free = tuple(Free(f"{EFFECT.name}.{p}", units[p], -MOST, MOST, start[f"{EFFECT.name}.{p}"], SCALE) for p in PARTS)

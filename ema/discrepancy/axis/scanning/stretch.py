@@ -13,7 +13,7 @@ from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
 from ema.effects.position_friction import FORMS, fading
 
-from .weak_form import FEWEST, Weak, weak_form
+from .weak_form import FEWEST, Weak, bound_friction, fit_frictions, weak_form
 
 if TYPE_CHECKING:
     from ema.discrepancy.axis.reading.measured import Measured
@@ -61,13 +61,6 @@ def _gains(every: Sequence[_Stretch], weak: Weak, q: Array, rest: Array) -> Arra
     return np.where(is_seen, (left.T @ rest) ** 2 / np.maximum(power, 1e-300), 0.0)
 
 
-def _frictions(stretch: _Stretch, weak: Weak, always: Array) -> tuple[float, float]:
-    """By how much friction is another than the model's, everywhere and in the stretch beside that. [N m]"""
-    A = np.column_stack([always / weak.sigma[:, None], _columns([stretch], weak)])
-    (_, everywhere, *_, there), *_ = np.linalg.lstsq(A, weak.y / weak.sigma, rcond=None)
-    return float(everywhere), float(there)
-
-
 def stretch_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Sequence[int]) -> Candidate | None:
     """For each width and form the likeliest place as a start; None where the effect is in the model already."""
     if any(name.startswith(NAME) for name in point):
@@ -79,7 +72,6 @@ def stretch_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Seque
     always = np.stack(weak.always(), axis=1)
     low, high = float(weak.motion.theta.min()), float(weak.motion.theta.max())
     h = max(s.half_range, 1e-12)
-    friction = next(f for f in plant.base if f.name == "F_d")
     starts = []
     for w, flatness in product(WIDTHS * h, FORMS):
         centres = np.arange(low, high + SPACING * w, SPACING * w)
@@ -88,8 +80,8 @@ def stretch_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Seque
             best = _best([best, *best.near(0.5**k)], weak, q, rest)
         gain = float(_gains([best], weak, q, rest)[0])
         if gain > 0.0:
-            elsewhere, size = _frictions(best, weak, always)
-            F_d = float(np.clip(point["F_d"] + elsewhere, max(friction.low, 1e-3 * s.torque), friction.high))
+            elsewhere, (size,) = fit_frictions(weak, always, _columns([best], weak))
+            F_d = bound_friction(plant, s, point, elsewhere)
             height = float(np.clip(size / F_d, LOWEST, HIGHEST))
             values = {"height": height, "centre": best.centre, "width": best.width, "flatness": flatness}
             starts.append((gain, {"F_d": F_d, **{f"{NAME}.{key}": value for key, value in values.items()}}))

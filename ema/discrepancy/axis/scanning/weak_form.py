@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ema.discrepancy.axis.reading.measured import Measured
     from ema.discrepancy.axis.reading.windows import Bench, Window
     from ema.discrepancy.plant import Point
+    from ema.effects.search import AxisSizes
 
 HALF_WIDTHS = (3, 5, 8, 12, 20, 32, 50)  # of a test function, in samples
 FEWEST, MAX_ROWS = 30, 2500  # test functions with which regressions are worth it, and with which they stay quick
@@ -195,7 +196,7 @@ def _moving(plant: Measured, model: axis.Model, j: int, offset: int, zero: float
     else:
         position = w.outputs[b.roles.outputs.index(str(b.roles.position))]
         inertia = (np.interp(w.t + late[0], w.t, position)[index] @ second) / dt**2
-    by_angle = axis.inertia_along(model, theta + zero) - J
+    by_angle, _ = axis.inertia_by_angle(model, theta + zero)
     uneven = -(by_angle * speed)[index] @ first / dt  # of the momentum, what is not the mean inertia's
     y = known[index] @ phi - J * inertia - uneven
     steady = (np.sign(speed[index]) == np.sign(speed[centres])[:, None]).all(axis=1)  # no reversal, no standstill
@@ -217,3 +218,18 @@ def _current(b: Bench, w: Window, drive: Array, speed: Array, z: Array) -> tuple
     if kind == "speed-loop":
         return np.clip(z[row("K_w")] * (drive - speed), -z[row("I_max")], z[row("I_max")]), k_t
     return drive, k_t
+
+
+def fit_frictions(weak: Weak, always: Array, columns: Array) -> tuple[float, Array]:
+    """By how much friction is another everywhere, and coefficients of `columns` (n_y, n) over σ beside that. [N m]"""
+    A = np.column_stack([always / weak.sigma[:, None], columns])
+    (_, everywhere, *_), own = np.split(
+        np.linalg.lstsq(A, weak.y / weak.sigma, rcond=None)[0], [always.shape[1]]
+    )  # fmt: skip
+    return float(everywhere), own
+
+
+def bound_friction(plant: Measured, s: AxisSizes, point: Point, more: float) -> float:
+    """Friction at a point and `more`, within where it is searched and above nothing. [N m or N]"""
+    friction = next(f for f in plant.base if f.name == "F_d")
+    return float(np.clip(point["F_d"] + more, max(friction.low, 1e-3 * s.torque), friction.high))

@@ -40,8 +40,8 @@ def smooth_motion(plant: Measured, model: axis.Model, c: Course, half: float) ->
     i, drive = _current(c, w, model.z)
     is_force = c.bench.roles.kind == "force"
     known = axis.torque_along(model, theta, w, i, c.t, c.dT, c.load, force=is_force)
-    by_angle = axis.inertia_along(model, theta) - model.inertia
-    known -= by_angle * a + np.gradient(by_angle, c.t) * w  # of the momentum, what is not the mean inertia's
+    by_angle, slope = axis.inertia_by_angle(model, theta)
+    known -= by_angle * a + slope * w**2  # of the momentum, what is not the mean inertia's
     still = np.zeros(len(w), bool)
     motion = Motion(c.t, theta, w, a, drive, known, direction, c.position is not None, still, dT=c.dT)
     motion = replace(motion, gear_orders=tuple(plant.plant.gear_orders), turns=_turns(plant))
