@@ -30,6 +30,7 @@ MAX_ADDED = 5  # of both kinds, further lines of a kind that is there already co
 IMMATERIAL = 0.01  # of the noise's mean square: what takes less is told, and no cause: no plant file is that exact
 MANY = 12  # free parameters from which an effect is revised beside its strongest rivals only
 N_RIVALS = 6
+BETTER = 1.0  # [nats] by which one fit of a model is better than another, and not the end of its iteration
 
 
 Reread = Callable[[Tried, Tried], bool]
@@ -192,7 +193,7 @@ def revise(plant: Plant, state: State, progress: Progress) -> None:
     """Look again at each effect beside the later ones: drop what they made superfluous, replace what they unmasked."""
     drop_unneeded(plant, state, progress)
     k = 0
-    while len(state.model.accepted) > 1 and k < len(state.model.accepted):
+    while k < len(state.model.accepted):
         own = state.model.accepted[k]
         trials, reduced = state.rounds[k]
         is_current = own.key in trials and trials[own.key] is state.model
@@ -200,9 +201,11 @@ def revise(plant: Plant, state: State, progress: Progress) -> None:
             many = bool(trials) and len(reduced.fits[0].free) > MANY
             rivals = _strongest(trials, reduced) if many else None
             trials = _round(plant, state, reduced, progress, rivals)
-            trials[own.key] = state.model
+            trials[own.key] = _fitted_better(trials.get(own.key), state.model)
             best = choose(trials, reduced) or own.key
-            if best != own.key and compare(trials[best], state.model).is_clear:
+            if not compare(trials[best], trials[own.key]).is_clear:
+                best = own.key
+            if trials[best] is not state.model:
                 del state.rounds[k]
                 state.rounds.append((trials, reduced))
                 state.model = trials[best]  # the new one stands last
@@ -230,6 +233,11 @@ def drop_unneeded(plant: Plant, state: State, progress: Progress) -> None:
         weakest = min(gains, key=lambda k: gains[k])
         state.model = without[weakest]
         del state.rounds[weakest]
+
+
+def _fitted_better(again: Tried | None, model: Tried) -> Tried:
+    """The model, or what a round has fitted in its place where that is the better fit: dry friction has side minima."""
+    return again if again is not None and compare(again, model).gain > BETTER else model
 
 
 def _likelier(one: Tried, other: Tried) -> Tried:

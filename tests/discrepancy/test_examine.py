@@ -13,10 +13,11 @@ from ema.discrepancy.fitting import best_fit, fit, jacobian
 from ema.discrepancy.held_out import by_record, over_folds, residual_over_folds, training_errors
 from ema.discrepancy.plant import Block, Candidate, Errors, Free
 from ema.discrepancy.progress import Progress
-from ema.discrepancy.rounds import State, drop_unneeded, leave_out, select
+from ema.discrepancy.rounds import State, drop_unneeded, leave_out, revise, select
 from ema.discrepancy.selection import fit_base, fit_with_each, split_into_folds
 from ema.discrepancy.trust import at_bound, describe_effects, drop_unlikely
 from ema.discrepancy.verdict import correlation_test, judge, scale_test
+from ema.discrepancy.weighing import weigh_sets
 
 N_BLOCKS, N = 12, 120
 QUIET = 1.0  # noise of a whitened residual
@@ -141,6 +142,36 @@ def test_an_effect_that_a_later_one_makes_superfluous_is_left_out():
     final = fit(toy, [*toy.base, *state.model.accepted[0].free], state.model.fits[0].point, range(N_BLOCKS))
     (told,) = describe_effects(toy, state, {"b": 1.0}, weighed, final.point, final.draw)
     assert told["name"] == "b"
+
+
+def _found_beside_what_is_not_there(toy):
+    """A selection that took `a`, which is not there, before `b`, which is."""
+    plain = fit_base(toy)
+    first = fit_with_each(toy, plain, toy.candidates, str)
+    second = fit_with_each(toy, first["a"], toy.candidates, str)
+    return State(plain, second["b"], [(first, plain), (second, first["a"])], [])
+
+
+def test_what_stays_alone_is_weighed_against_what_looks_like_it_alone():
+    toy = Toy(4, ("a", "b", "c"), b=0.8)
+    toy.columns["c"] = toy.columns["b"] + 1e-6 * toy.columns["c"]
+    state = _found_beside_what_is_not_there(toy)
+    revise(toy, state, Progress())
+    weighed = weigh_sets(state.plain, state.model, state.rounds)
+    p = {e.causes: e.probability for e in weighed.entries}
+    assert p["b",] + p["c",] > 0.9
+    assert 0.2 < p["b",] / p["c",] < 5.0
+
+
+def test_a_fit_that_ended_in_a_side_minimum_gives_way_to_a_better_one_of_the_same_effects():
+    toy = Toy(5, ("a", "b"), a=0.8, b=0.8)
+    state = _found_beside_what_is_not_there(toy)
+    away = {"k": 0.0, "a.size": 0.5, "b.size": 0.8}
+    state.model = replace(state.model, held_out=tuple(toy.residuals([away], range(N_BLOCKS))[0]))
+    assert state.model.rms > 1.03
+    revise(toy, state, Progress())
+    assert {c.key for c in state.model.accepted} == {"a", "b"}
+    assert state.model.rms == pytest.approx(1.0, abs=0.03)
 
 
 def test_fits_are_least_squares_within_bounds():
