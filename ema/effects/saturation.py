@@ -8,12 +8,12 @@ from .base import NOT_NEGATIVE, Effect, Parameter
 from .search import AxisSizes, Look, Span
 
 
-def emf_factor(i_j, dT, emf, inductance):
-    """κ × 1 / (1 + β i²)"""
-    return 1.0 / (1.0 + emf * i_j * i_j)
+def emf_factor(i_j, dT, emf, inductance, per_ampere):
+    """κ × 1 / (1 + α |i| + β i²): iron that gives way from the first ampere on, or later."""
+    return 1.0 / (1.0 + abs(i_j) * (per_ampere + emf * abs(i_j)))
 
 
-def inductance_factor(i_j, emf, inductance):
+def inductance_factor(i_j, emf, inductance, per_ampere):
     """L × 1 / (1 + γ i²)"""
     return 1.0 / (1.0 + inductance * i_j * i_j)
 
@@ -22,7 +22,10 @@ def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
     """Where a search begins, by what the records hold."""
     if s.is_force:
         return None
-    return {"emf": Span(0.0, 0.3 / s.current**2, (0.03 / s.current**2,), 0.02 / s.current**2)}
+    return {
+        "emf": Span(0.0, 0.3 / s.current**2, (0.03 / s.current**2,), 0.02 / s.current**2),
+        "per_ampere": Span(0.0, 0.3 / s.current, (0.01 / s.current,), 0.02 / s.current),
+    }
 
 
 EFFECT = Effect(
@@ -30,14 +33,16 @@ EFFECT = Effect(
     parameters=(
         Parameter("emf", "1/A^2", 0.0, 0.0, 0.005, 0.0004, "relative loss of torque constant per current squared"),
         Parameter("inductance", "1/A^2", 0.0, 0.0, 0.01, 0.001, "relative loss of inductance per current squared"),
+        Parameter("per_ampere", "1/A", 0.0, 0.0, 0.05, 0.004, "relative loss of torque constant per current"),
     ),
     sentence="magnetic saturation: the torque constant falls by {emf:.2g} per A², "
     "the inductance by {inductance:.2g} per A²",
+    besides={"per_ampere": ", and the torque constant by {per_ampere:.2g} per A more"},
     separated_by="motions with high and low acceleration",
     laws={"emf_factor": emf_factor, "inductance_factor": inductance_factor},
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema", "axis"),
-    limits={"emf": NOT_NEGATIVE, "inductance": NOT_NEGATIVE},
+    limits=dict.fromkeys(("emf", "inductance", "per_ampere"), NOT_NEGATIVE),
     looks=(Look("emf", "inductance"),),
     on_axis=on_axis,
 )
