@@ -81,14 +81,19 @@ class Left:
 
     @property
     def event(self) -> str:
-        """What happened once, in words; empty where nothing did."""
+        """What one part leaves far more of than all others, in words; empty where none does.
+
+        It happened once where the others leave what noise makes; else it is in them too, and strongest there.
+        """
         if self.is_chance or self.residual.event is None:
             return ""
         name, rest, others = self.residual.event
-        return (
-            f"{name} leaves {rest:.3g} times the noise, every other part at most {others:.3g}: something happened "
-            "there that is not in the rest of the record (a slip, a blow, a disturbed signal)"
+        what = (
+            "something happened there that is not in the rest of the record (a slip, a blow, a disturbed signal)"
+            if others <= self.allowed
+            else "what is missing is in the others too, and most of it there"
         )
+        return f"{name} leaves {rest:.3g} times the noise, every other part at most {others:.3g}: {what}"
 
     @property
     def sentence(self) -> str:

@@ -91,10 +91,19 @@ def test_what_happens_once_is_no_chance_and_is_told_with_its_part():
     assert slipped.residual.rest < slipped.allowed
     assert grade(slipped, named=False) == "unexplained"
     assert "cycle 9 leaves 3.08 times the noise, every other part at most 1.02" in slipped.event
+    assert "something happened there" in slipped.event
     assert grade(Left(True, folds(*[1.0] * 10), folds(*usual, 3.08)), named=False) == "adequate"
     assert grade(Left(False, folds(*[1.0] * 10), folds(*usual, 3.08)), named=True) == "partly explained"
     for parts in ((*usual, 1.5), (*usual[:8], 2.1, 2.2), (0.9, 1.3, 1.7, 2.1), (1.0, 3.0)):
         assert Left(False, folds(*parts), folds(*parts)).event == ""
+
+
+def test_what_is_strongest_in_one_part_and_in_others_too_did_not_happen_once():
+    """An inertia that grows with speed left 15.8 floors in the quickest part of 12, and up to 4.3 in others."""
+    parts = folds(1.1, 1.3, 1.2, 2.0, 4.3, 1.5, 1.1, 1.2, 1.4, 1.3, 1.2, 15.8)
+    told = Left(False, parts, parts).event
+    assert "most of it there" in told
+    assert "happened" not in told
 
 
 def test_one_lucky_part_does_not_make_it_explained():

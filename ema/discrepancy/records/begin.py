@@ -80,8 +80,13 @@ def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
         raise RecordError(f"{records[0].name}: no motion: theta_m, w_m, q or v is wanted (has {there})")
     measured = "force" if linear else "torque"
     drive = next((name for name in (measured, "i_q", "u_q", "duty") if name in have), None)
+    reference = "q_ref" if linear else "theta_ref"
     if drive is None:
-        raise RecordError(f"{records[0].name}: no drive: {measured}, i_q, u_q or duty is wanted (has {there})")
+        by_loop = f"; a position_loop that makes it from {reference} is written by hand, see docs/axis.md"
+        raise RecordError(
+            f"{records[0].name}: no drive: {measured}, i_q, u_q or duty is wanted (has {there})"
+            f"{by_loop if reference in have else ''}"
+        )
     known = [Known("kind", "axis", "")] + ([Known("motion", "linear", "")] if linear else [])
     kind = {"i_q": "current", "u_q": "voltage", "duty": "voltage"}.get(drive, drive)
     known.append(Known("drive", kind, f"by the channel {drive}"))

@@ -108,6 +108,17 @@ def test_a_record_for_no_plant_is_a_negative_answer(tmp_path):
     assert "a position or a speed" in done.stdout
 
 
+def test_a_reference_is_enough_where_a_position_loop_makes_the_drive(tmp_path):
+    rows = "\n".join(f"{0.01 * n},{np.sin(0.05 * n)},{np.sin(0.05 * n - 0.1)}" for n in range(600))
+    (tmp_path / "x.csv").write_text(f"t [s],theta_ref [rad],theta_m [rad]\n{rows}")
+    done = CliRunner().invoke(cli, ["records", "check", str(tmp_path / "x.csv")])
+    assert done.exit_code == 0
+    assert "position_loop" in done.stdout
+    begun = CliRunner().invoke(cli, ["plant", "init", str(tmp_path / "x.csv"), "--out", str(tmp_path / "plant.yaml")])
+    assert begun.exit_code != 0
+    assert "position_loop that makes it from theta_ref" in str(begun.exception)
+
+
 def test_an_actuator_s_record_tells_its_gear_and_its_star(hidden, tmp_path):
     cycles = hidden.cycles(hidden.Flaws(), 1, 1, motions=(hidden.chirp(),))
     record = Record(tuple(Cycle(n, channels) for n, channels in enumerate(cycles)))
