@@ -11,12 +11,11 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit, vectorize
 
 from ema.core.records import Array
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects import registry
-from ema.effects.stribeck import factor
+from ema.effects.stribeck import fade
 
 from .weak_form import FEWEST, Weak, weak_form
 
@@ -26,13 +25,10 @@ if TYPE_CHECKING:
 
 NAME = "stribeck"
 SPEEDS = np.geomspace(0.02, 1.0, 12)  # of the rms speed
-SHAPES = (0.0, 0.5, 1.0)
+SHAPES = (-1.0, 0.0, 0.5, 1.0)
 HIGHEST = 3.0  # excess
 LEAST = 1e-3  # of a column that must be left beside the others
 N_STARTS = 4
-
-_factor = njit(factor)
-_law = vectorize(nopython=True)(lambda w, speed, shape: _factor(0.0, w, 0.0, 0.0, 0.0, 1.0, speed, shape) - 1.0)
 
 
 @dataclass(frozen=True)
@@ -65,7 +61,7 @@ def fadings(weak: Weak, beside: Sequence[Array], speeds: Array) -> list[Fading]:
     way, y = np.sign(weak.motion.direction), weak.y / weak.sigma
     found = []
     for speed, shape in product(speeds.tolist(), SHAPES):
-        column = weak.integrate(way * _law(weak.motion.w, speed, shape))
+        column = weak.integrate(way * fade(weak.motion.w, speed, shape))
         A = np.stack([*beside, column], axis=1) / weak.sigma[:, None]
         if np.linalg.cond(A / np.maximum(np.linalg.norm(A, axis=0), 1e-300)) > 1.0 / LEAST:
             continue
@@ -95,7 +91,7 @@ def fading_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Sequen
     bounds = {
         "excess": (0.0, HIGHEST, 0.1),
         "speed": (0.01 * s.speed, s.speed, 0.05 * s.speed),
-        "shape": (0.0, 1.2, 0.2),
+        "shape": (-1.0, 1.2, 0.2),
     }
     free = tuple(
         Free(f"{NAME}.{name}", units[name], low, high, starts[0][f"{NAME}.{name}"], scale)

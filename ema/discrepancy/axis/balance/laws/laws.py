@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ema.core.records import Array
+from ema.effects.stribeck import fade
 
 from .along import by_position
 from .drifting import drift_laws
@@ -87,28 +88,28 @@ def _by_speed(m: Motion, u: Units) -> Iterator[Law]:
     if high > low:
         step = (high / low) ** (1.0 / (N_SPEEDS - 1))
         for over in np.geomspace(low, high, N_SPEEDS):
-            yield from (_stribeck(float(over), power, step, (low, high), u) for power in (1.0, 2.0))
+            yield from (_stribeck(float(over), shape, step, (low, high), u) for shape in (-1.0, 0.0, 1.0))
 
 
-def _stribeck(over: float, power: float, step: float, ends: tuple[float, float], u: Units) -> Law:
+def _stribeck(over: float, shape: float, step: float, ends: tuple[float, float], u: Units) -> Law:
     """Friction that fades over a speed between `ends`; the family's next members fade over `step` times as much."""
     return Law(
         "stribeck",
-        f"stribeck {over:.8g} {power:g}",
+        f"stribeck {over:.8g} {shape:g}",
         "stribeck",
-        _falling(over, power),
+        _falling(over, shape),
         {"more": u.torque, "speed": u.speed, "shape": "1"},
-        one("more", speed=over, shape=power - 1.0),
+        one("more", speed=over, shape=shape),
         f"friction changes with speed, {{more:+.3g}} {u.torque} at rest, fading over {{speed:.3g}} {u.speed}",
         "slow motion at several constant speeds",
         is_friction=True,
-        around=members_around(lambda x: _stribeck(x, power, step, ends, u), over, step, ends),
+        around=members_around(lambda x: _stribeck(x, shape, step, ends, u), over, step, ends),
     )
 
 
-def _falling(over: float, power: float) -> Columns:
-    """sign ω exp(-|ω/ω_s|^δ)"""
-    return lambda m, _: (m.direction * np.exp(-((np.abs(m.w) / over) ** power)),)
+def _falling(over: float, shape: float) -> Columns:
+    """sign ω f(|ω|/ω_s), see `ema.effects.stribeck`."""
+    return lambda m, _: (m.direction * fade(m.w, over, shape),)
 
 
 BY_LOAD: Mapping[str, tuple[str, str]] = {
