@@ -94,7 +94,7 @@ def fading_candidate(plant: Measured, s: AxisSizes, point: Point, blocks: Sequen
         "shape": (-1.0, 1.2, 0.2),
     }
     free = tuple(
-        Free(f"{NAME}.{name}", units[name], low, high, starts[0][f"{NAME}.{name}"], scale)
+        Free(f"{NAME}.{name}", units[name], low, high, starts[0][f"{NAME}.{name}"], scale, is_shape=name == "shape")
         for name, (low, high, scale) in bounds.items()
     )
     return Candidate(NAME, NAME, free, tuple(starts))
