@@ -88,7 +88,7 @@ def _by_speed(m: Motion, u: Units) -> Iterator[Law]:
     if high > low:
         step = (high / low) ** (1.0 / (N_SPEEDS - 1))
         for over in np.geomspace(low, high, N_SPEEDS):
-            yield from (_stribeck(float(over), shape, step, (low, high), u) for shape in (-1.0, 0.0, 1.0))
+            yield from (_stribeck(float(over), shape, step, (low, high), u) for shape in (0.0, 1.0))
 
 
 def _stribeck(over: float, shape: float, step: float, ends: tuple[float, float], u: Units) -> Law:
