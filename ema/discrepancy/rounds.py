@@ -11,6 +11,7 @@ from .grade import LIMIT
 from .plant import Candidate, Plant, Point
 from .progress import Progress
 from .selection import (
+    BETTER,
     N_FOLDS,
     Tried,
     above_noise,
@@ -30,7 +31,6 @@ MAX_ADDED = 5  # of both kinds, further lines of a kind that is there already co
 IMMATERIAL = 0.01  # of the noise's mean square: what takes less is told, and no cause: no plant file is that exact
 MANY = 12  # free parameters from which an effect is revised beside its strongest rivals only
 N_RIVALS = 6
-BETTER = 1.0  # [nats] by which one fit of a model is better than another, and not the end of its iteration
 
 
 Reread = Callable[[Tried, Tried], bool]
@@ -201,7 +201,8 @@ def revise(plant: Plant, state: State, progress: Progress) -> None:
             many = bool(trials) and len(reduced.fits[0].free) > MANY
             rivals = _strongest(trials, reduced) if many else None
             trials = _round(plant, state, reduced, progress, rivals)
-            trials[own.key] = _fitted_better(trials.get(own.key), state.model)
+            again = trials.get(own.key, state.model)
+            trials[own.key] = _likelier(again, state.model, by=BETTER)
             best = choose(trials, reduced) or own.key
             if not compare(trials[best], trials[own.key]).is_clear:
                 best = own.key
@@ -235,14 +236,9 @@ def drop_unneeded(plant: Plant, state: State, progress: Progress) -> None:
         del state.rounds[weakest]
 
 
-def _fitted_better(again: Tried | None, model: Tried) -> Tried:
-    """The model, or what a round has fitted in its place where that is the better fit: dry friction has side minima."""
-    return again if again is not None and compare(again, model).gain > BETTER else model
-
-
-def _likelier(one: Tried, other: Tried) -> Tried:
-    """Of two fits of one model that under which held-out parts are likelier: dry friction has side minima."""
-    return one if compare(one, other).gain > 0.0 else other
+def _likelier(one: Tried, other: Tried, by: float = 0.0) -> Tried:
+    """One of two fits of one model if held-out parts are likelier under it, `by` nats: dry friction has side minima."""
+    return one if compare(one, other).gain > by else other
 
 
 def leave_out(plant: Plant, model: Tried, out: set[int]) -> Tried:

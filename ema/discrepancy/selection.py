@@ -17,6 +17,7 @@ N_FOLDS = 2
 FEW = 4  # parameters up to which all of them are differenced in every iteration
 N_LEADING = 3  # candidates fitted with all parameters where slopes were frozen
 MIN_PARTS = 40  # parts over which gains are compared in pairs
+BETTER = 1.0  # [nats] by which one fit of a model is better than another, and not the end of its iteration
 ODDS = 5.0  # difference in log-likelihood (150 : 1) from which one explanation is preferred
 NEARLY_NOISE = 1.1  # scale of a residual below which likelihoods can be taken at their word
 CHANCE = 0.006  # that parts which gain or lose alike show as much: of many small gains, 2.5 standard errors
@@ -160,7 +161,7 @@ def _help_by_other_folds(plant: Plant, own: Fit, fits: Sequence[Fit]) -> Fit:
             continue
         residuals = plant.residuals([other.point], own.blocks)[0]
         here, there = rate([own.residuals, residuals])
-        if there > here + 1.0:
+        if there > here + BETTER:
             own = fit(plant, own.free, other.point, own.blocks)
     return own
 

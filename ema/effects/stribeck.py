@@ -35,7 +35,9 @@ EFFECT = Effect(
         Parameter(
             "excess", "1", 0.0, 0.0, 1.5, 0.3, "sliding friction at zero speed over its value at high speed, less one"
         ),
-        Parameter("speed", "rad/s", 10.0, 0.5, 80.0, 10.0, "speed over which the excess fades by 1/e"),
+        Parameter(
+            "speed", "rad/s", 10.0, 0.5, 80.0, 10.0, "speed over which the excess fades to 1/e, at shape -1 to one half"
+        ),
         Parameter(
             "shape", "1", 0.0, -1.0, 1.2, 0.5, "how it fades: -1 as 1/(1 + x²), 0 exponentially, 1 as a Gaussian"
         ),

@@ -8,14 +8,13 @@ import numpy as np
 
 from ema.core.names import CHANNELS, CURRENTS
 from ema.core.records import Record
-from ema.discrepancy.axis.reading.channels import LOAD_CHANNEL
+from ema.discrepancy.axis.reading.channels import LOAD_CHANNEL, LOOP_CHANNELS
 
 from .agreements import Agreement
 from .facts import FALLEN, ChannelFacts, Sampling
 
 ACTUATOR = ("t", *CURRENTS, "theta_m", "theta_u", "theta_cmd")
 DRIVES = ("i_q", "torque", "force", "u_q", "duty", "w_ref")
-REFERENCES = {"theta_m": "theta_ref", "q": "q_ref"}  # from which a declared position loop makes the drive
 FEW = 500  # samples of a record from which a fit has something left to be tested with
 DUTY = 1.1  # largest duty cycle, with what a converter may add
 JITTERY = 0.2  # of a period, rms
@@ -42,7 +41,7 @@ def list_allowed(record: Record, clock: Sampling, facts: list[ChannelFacts], agr
         plants["ema"] = "faults k1…k6 and the effects of an actuator"
     motion = have & {"theta_m", "w_m", "q", "v"}
     drives = [name for name in DRIVES if name in have]
-    loops = [reference for position, reference in REFERENCES.items() if {position, reference} <= have]
+    loops = [reference for position, reference in LOOP_CHANNELS.values() if {position, reference} <= have]
     if motion and drives:
         load = LOAD_CHANNEL[not motion & {"theta_m", "w_m"}]
         against = f" against the known load {load}" if load in have else ""
@@ -53,11 +52,10 @@ def list_allowed(record: Record, clock: Sampling, facts: list[ChannelFacts], agr
             f"by which {loops[0]} makes the drive"
         )
     else:
-        missing["axis"] = ([] if motion else ["a position or a speed: theta_m, w_m, q or v"]) + (
-            []
-            if drives
-            else [f"a drive: {', '.join(DRIVES)}, or {' or '.join(REFERENCES.values())} of a position_loop"]
-        )
+        references = " or ".join(reference for _, reference in LOOP_CHANNELS.values())
+        a_drive = f"a drive: {', '.join(DRIVES)}, or {references} of a position_loop"
+        missing["axis"] = [] if motion else ["a position or a speed: theta_m, w_m, q or v"]
+        missing["axis"] += [] if drives else [a_drive]
     disagreeing = [f"{one.what}: {one.said}" for one in agree if not one.is_fine]
     return Allowed(plants, missing, [*_clock(clock), *_channels(facts), *disagreeing])
 

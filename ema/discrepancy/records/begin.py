@@ -13,7 +13,7 @@ import numpy as np
 from ema.core.errors import RecordError
 from ema.core.names import CHANNELS, CURRENTS
 from ema.core.records import Array, Cycle, Record
-from ema.discrepancy.axis.reading.channels import LOAD_CHANNEL, known_load
+from ema.discrepancy.axis.reading.channels import LOAD_CHANNEL, LOOP_CHANNELS, known_load
 
 from .agreements import agreements, derivative, smooth
 from .first_fit import FirstFit, first_fit
@@ -80,13 +80,12 @@ def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
         raise RecordError(f"{records[0].name}: no motion: theta_m, w_m, q or v is wanted (has {there})")
     measured = "force" if linear else "torque"
     drive = next((name for name in (measured, "i_q", "u_q", "duty") if name in have), None)
-    reference = "q_ref" if linear else "theta_ref"
     if drive is None:
-        by_loop = f"; a position_loop that makes it from {reference} is written by hand, see docs/axis.md"
-        raise RecordError(
-            f"{records[0].name}: no drive: {measured}, i_q, u_q or duty is wanted (has {there})"
-            f"{by_loop if reference in have else ''}"
-        )
+        said = f"{records[0].name}: no drive: {measured}, i_q, u_q or duty is wanted (has {there})"
+        _, reference = LOOP_CHANNELS[linear]
+        if reference in have:
+            said += f"; a position_loop that makes it from {reference} is written by hand, see docs/axis.md"
+        raise RecordError(said)
     known = [Known("kind", "axis", "")] + ([Known("motion", "linear", "")] if linear else [])
     kind = {"i_q": "current", "u_q": "voltage", "duty": "voltage"}.get(drive, drive)
     known.append(Known("drive", kind, f"by the channel {drive}"))

@@ -7,7 +7,7 @@ import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.finding.plant import AxisPlant
-from ema.discrepancy.axis.reading.jumps import between_samples
+from ema.discrepancy.axis.reading.jumps import measure_jumps
 from ema.discrepancy.axis.reading.noise import Noise
 from ema.models.axis_config import RotaryAxis
 
@@ -21,7 +21,7 @@ def test_the_mean_over_a_jump_is_off_by_what_is_told():
     moment = rng.uniform(0.0, 1.0, 4000)
     off = 3.0 * ((1.0 - moment) - 0.5)
     drive = np.repeat([0.0, 3.0], 10)
-    told = between_samples(T * np.arange(20), drive, NONE, Noise(0.001))
+    told = measure_jumps(T * np.arange(20), drive, NONE, Noise(0.001))
     assert told.argmax() == 9
     assert told[9] == pytest.approx(np.std(off), rel=0.05)
     assert not told[[*range(7), *range(12, 20)]].any()
@@ -31,12 +31,12 @@ def test_a_drive_that_its_samples_show_does_nothing_between_them():
     t = T * np.arange(3000)
     for seed in range(5):
         noise = 0.01 * np.random.default_rng(seed).standard_normal(t.size)
-        assert not between_samples(t, np.sin(2 * np.pi * 3.0 * t) + noise, NONE, Noise(0.01)).any()
+        assert not measure_jumps(t, np.sin(2 * np.pi * 3.0 * t) + noise, NONE, Noise(0.01)).any()
 
 
 def test_no_jump_is_seen_over_a_gap():
     drive = np.repeat([0.0, 3.0], 10)
-    assert not between_samples(T * np.arange(20), drive, np.array([10]), Noise(0.001)).any()
+    assert not measure_jumps(T * np.arange(20), drive, np.array([10]), Noise(0.001)).any()
 
 
 def _record(seed: int) -> Record:

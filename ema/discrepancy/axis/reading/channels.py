@@ -20,6 +20,7 @@ NOT_SLOWED = 0.4  # of its usual speed
 ONE_SCALE = 1.25  # ratio of the recorded speed to that of the position
 IN_STEP = 0.8  # correlation of the torque that the motion needs with the recorded one
 LOAD_CHANNEL = {False: "load_torque", True: "load_force"}  # of an axis that is linear, or not
+LOOP_CHANNELS = {False: ("theta_m", "theta_ref"), True: ("q", "q_ref")}  # position and reference, by the same
 DRIVE_CHANNEL = {"current": "i_q", "voltage": "u_q", "force": "force", "torque": "torque", "speed-loop": "w_ref"}
 
 

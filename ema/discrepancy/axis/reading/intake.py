@@ -20,7 +20,7 @@ from ema.core.errors import RecordError
 from ema.core.records import Array, Cycle, Record
 from ema.models.axis_config import Axis, PositionLoop
 
-from .channels import find_runs
+from .channels import LOOP_CHANNELS, find_runs
 from .smooth import local_polynomial
 
 GIVEN = {"current": "i_q", "voltage": "u_q", "torque": "torque", "force": "force", "duty": "duty"}
@@ -57,7 +57,7 @@ def _driven(plant: Axis, record: Record) -> Record:
 
 def ask_of_loop(plant: Axis, loop: PositionLoop, cycle: Cycle, name: str) -> Array:
     """What a position loop asks for along the measured motion, in its own unit."""
-    position, reference = ("q", "q_ref") if plant.is_linear else ("theta_m", "theta_ref")
+    position, reference = LOOP_CHANNELS[plant.is_linear]
     missing = [channel for channel in (position, reference) if channel not in cycle]
     if missing:
         raise RecordError(f"{name}: position_loop needs the channel {missing[0]} (has {', '.join(cycle.channels)})")

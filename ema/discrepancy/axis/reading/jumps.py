@@ -17,7 +17,7 @@ USUAL = norm.ppf(0.75)  # deviations of the median of absolute normal numbers
 AT_ANY_MOMENT = 1.0 / np.sqrt(12.0)  # deviation of a moment that is somewhere between two samples, over the period
 
 
-def between_samples(t: Array, drive: Array, gaps: NDArray[np.int_], noise: Noise) -> Array:
+def measure_jumps(t: Array, drive: Array, gaps: NDArray[np.int_], noise: Noise) -> Array:
     """Deviation of the drive's mean over each step from that of a straight line, shape (n_times,); 0 after a part.
 
     A jump is at some moment between two samples, which a record does not tell. It stands out by its third difference
@@ -30,9 +30,8 @@ def between_samples(t: Array, drive: Array, gaps: NDArray[np.int_], noise: Noise
     for rows in np.split(np.arange(len(drive)), gaps):
         if len(rows) > 3:
             third = np.abs(np.diff(drive[rows], 3))
-            of_noise = np.maximum.reduce(
-                np.broadcast_arrays(sigma[rows[1:-2]], sigma[rows[2:-1]], np.median(third) / USUAL)
-            )
+            of_noise = np.maximum(sigma[rows[1:-2]], sigma[rows[2:-1]])
+            of_noise = np.maximum(of_noise, np.median(third) / USUAL)
             more = np.sqrt(np.maximum(third**2 - of_noise**2, 0.0))
             out[rows[1:-2]] = np.where(third > SHOWN * of_noise, more / OF_JUMP * AT_ANY_MOMENT, 0.0)
     return out

@@ -15,7 +15,7 @@ from ema.effects.base import T_REFERENCE
 from ema.models.axis_config import Axis
 
 from .channels import MIN_SAMPLES, Roles, find_runs, known_load, roles
-from .jumps import between_samples
+from .jumps import measure_jumps
 from .local_polynomials import left_of_noise, smooth
 from .noise import ESTIMATE_UNCERTAINTY, Noise, estimate, is_derived
 from .pushed import pushed
@@ -39,7 +39,7 @@ PER_CYCLE = 1_000_000  # stretches and parts that a cycle may have
 class Part:
     """Samples of one cycle from gap to gap, in arrays of shape (n_times,).
 
-    Drive with less noise (`quiet_drive.py`; a share `left` of its variance is in it) and what it may do `between` its
+    Drive with less noise (`quiet_drive.py`; a share `left` of its variance is in it), what its `jumps` may do between
     samples (`jumps.py`), torque of a known load and position as recorded, position and speed to begin from; `number`
     is like no other part's of the record.
     """
@@ -48,7 +48,7 @@ class Part:
     t: Array
     drive: Array
     left: Array
-    between: Array
+    jumps: Array
     load: Array
     recorded: Array
     position: Array
@@ -211,11 +211,11 @@ def _moving(plant: Axis, length: float, group: str, cycle: Cycle, who: Roles, no
     out = []
     load = known_load(cycle, who.load)
     drive, left = quieten(t, cycle[who.drive], gaps, noise[who.drive])
-    between = between_samples(t, cycle[who.drive], gaps, noise[who.drive])
+    jumps = measure_jumps(t, cycle[who.drive], gaps, noise[who.drive])
     number = cycle.number * PER_CYCLE  # stretches and parts of different cycles are different
     starts = np.array([0, *gaps])
     started = _start_states(cycle, who, noise, gaps, (smoothed, speed))
-    pieces = zip(*(np.split(x, gaps) for x in (t, drive, left, between, load, raw, *started)), strict=True)
+    pieces = zip(*(np.split(x, gaps) for x in (t, drive, left, jumps, load, raw, *started)), strict=True)
     parts = [Part(number + start, *piece) for start, piece in zip(starts.tolist(), pieces, strict=True)]
     for a, b in pairwise(edges.tolist()):
         if any(start <= a < stop for start, stop in rests):

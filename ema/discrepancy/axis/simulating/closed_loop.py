@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ema.core.records import Array, Cycle
-from ema.discrepancy.axis.reading.channels import Roles, known_load
+from ema.discrepancy.axis.reading.channels import LOOP_CHANNELS, Roles, known_load
 from ema.discrepancy.axis.reading.intake import of_loop
 from ema.discrepancy.plant import Point
 from ema.models import axis
@@ -36,7 +36,7 @@ class LoopRun:
 def closed_loop(plant: Measured, point: Point) -> LoopRun | None:
     """Errors over all cycles; None where no position loop is declared, or no reference recorded."""
     p, loop = plant.plant, plant.plant.position_loop
-    position, reference = ("q", "q_ref") if p.is_linear else ("theta_m", "theta_ref")
+    position, reference = LOOP_CHANNELS[p.is_linear]
     if loop is None:
         return None
     model = plant.model(point)

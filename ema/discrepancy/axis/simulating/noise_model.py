@@ -81,7 +81,7 @@ def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseM
             through = passed / R * drive_noise if kind == "voltage" else 0.0
             noise.append(np.hypot(sigma.rms(np.gradient(w.outputs[place], w.t)), through))
     gain, damping = pushed(p, kind)
-    jumps = w.part.between[w.first : w.first + w.n]
+    jumps = w.part.jumps[w.first : w.first + w.n]
     process, drive = np.hypot(b.load_noise / J, gain * jumps), gain * drive_noise
     speed = w.part.speed[w.first : w.first + w.n]  # smoothed no wider than it bends: a stop is at its own sample
     at_rest = np.abs(speed) < 3.0 * START_NOISE * speed_noise(b.roles, b.noise, w.period)
