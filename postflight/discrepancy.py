@@ -81,9 +81,9 @@ def discrepancy(
     if as_json:
         click.echo(files[0].read_text(encoding="utf-8"), nl=False)
     else:
-        for sentence in findings.sentences():
+        for sentence in findings.sentences(numbers=True):
             click.echo(sentence)
-        for line in _leading(findings):
+        for line in list_leading(findings):
             click.echo(line)
         if findings.next_recording:
             click.echo(f"{findings.next_recording['sentence']}.")
@@ -122,7 +122,7 @@ def _examined(
             console.print(f"  {text}", highlight=False)
             status.update(text)
 
-        progress = Progress(say)
+        progress = Progress(say, status.update)
         try:
             with terminated_as_interrupted():
                 findings, draw = import_module(examiner).discrepancy(plant_file, read, progress)
@@ -144,10 +144,14 @@ def _examined(
     return findings
 
 
-def _leading(findings: Findings) -> list[str]:
+def list_leading(findings: Findings) -> list[str]:
     """The likeliest sets in one line."""
-    leading = findings.posterior[:N_LEADING]
-    told = [f"{' + '.join(s['effects']) or findings.gain.no_cause} {s['probability']:.2f}" for s in leading]
+    of: dict[str, float] = {}  # of sets of the same names, as two lines of other orders, together
+    for s in findings.posterior:
+        name = " + ".join(s["effects"]) or findings.gain.no_cause
+        of[name] = of.get(name, 0.0) + s["probability"]
+    leading = sorted(of.items(), key=lambda item: -item[1])[:N_LEADING]
+    told = [f"{name} {probability:.2f}" for name, probability in leading]
     return [f"Probabilities of the sets fitted: {', '.join(told)}."] if told else []
 
 

@@ -47,4 +47,7 @@ def explain_cause(findings: Mapping[str, Any], cause: str) -> str:
         return f"{cause} was fitted{beside} and is not the answer: {best['why']}."
     if findings["verdict"] == "adequate":
         return f"{cause} was not fitted: what is left without any effect is noise, or too little to be told from it."
-    return f"{cause} was not fitted: to first order it promised less than what was, or these records cannot show it."
+    return (
+        f"{cause} was not fitted: to first order it promised less than what was, or these records cannot show it. "
+        f"What shows it is {registry()[cause].separated_by}."
+    )

@@ -25,6 +25,10 @@ class Quantity:
     high: float
     unit: str
 
+    def __str__(self) -> str:
+        interval = f" ({self.low:.3g} … {self.high:.3g})" if self.high > self.low else ""
+        return f"{self.value:.3g}{interval}" + (f" {self.unit}" if self.unit != "1" else "")
+
     @property
     def sd(self) -> float:
         """Standard deviation, by the side of the interval that no bound cuts off."""
@@ -60,6 +64,12 @@ class FoundEffect:
         sizes = {p.name: p.neutral for p in declared if (p.unit, p.neutral) == (declared[0].unit, declared[0].neutral)}
         told = [(q, sizes[name]) for name, q in self.parameters.items() if name in sizes and q.sd > 0.0]
         return max((abs(q.value - neutral) / q.sd for q, neutral in told), default=None)
+
+    @property
+    def numbers(self) -> str:
+        """Confidence and parameters with their intervals, to be read behind the sentence."""
+        of = ", ".join(f"{name} {q}" for name, q in self.parameters.items())
+        return f" [P {self.of_set:.2f}{' for the set' if self.indistinguishable_from else ''}{'; ' if of else ''}{of}]"
 
     @property
     def of_set(self) -> float:
@@ -98,8 +108,18 @@ class Gain:
     @property
     def rest(self) -> float:
         """What is left of held-out parts over what noise makes of it, of error or residual whichever is more."""
-        error = self.heldout_after / max(self.noise_floor, 1e-300)
-        return max(error, self.residual.rest) if self.residual else error
+        return max(self._rest_of_error, self.residual.rest if self.residual else 0.0)
+
+    @property
+    def told_rest(self) -> str:
+        """The same in words, of which of the two it is."""
+        is_error = self.rest == self._rest_of_error
+        what = "the error of free runs" if is_error else "the residual weighed by its noise"
+        return f"{self.rest:.3g} times what noise makes is left, of {what}"
+
+    @property
+    def _rest_of_error(self) -> float:
+        return self.heldout_after / max(self.noise_floor, 1e-300)
 
 
 @dataclass(frozen=True)
@@ -198,27 +218,29 @@ class Findings:
         """Write findings.json."""
         path.write_text(json.dumps(self.as_dict(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
-    def sentences(self) -> list[str]:
-        """What an engineer would say."""
+    def sentences(self, *, numbers: bool = False) -> list[str]:
+        """What an engineer would say; with `numbers` each cause's confidence and intervals too."""
         if self.verdict == "unfinished":
             return [_led(self.leading)]
         if self.verdict == "adequate":
             if not self.rest:
                 return ["The simulation agrees with the measurement: what is left is noise."]
             left = f"What is left is small, {self.rest:.3g} times the noise, but it is not noise"
+            if self.rest <= 1.0:
+                left = "What is left is no larger than noise, but has a structure that noise has not"
             return [left + ("; its structure: " + describe(self.structure) if self.structure else "") + "."]
         said = []
         told: set[str] = set()  # experiments: each is told in full once
         for effect in self.effects:
-            said.append(_said(effect, again=effect.separated_by in told))
+            said.append(_said(effect, again=effect.separated_by in told) + (effect.numbers if numbers else ""))
             told.add(effect.separated_by)
         if self.verdict == "explained" and self.rest > SEEN:
             said.append(
-                f"What is left is {self.rest:.3g} times the noise, not noise: a law has not quite the right form, or "
-                "something smaller is missing."
+                f"What is left of the residual weighed by its noise is {self.rest:.3g} times the noise, not noise: "
+                "a law has not quite the right form, or something smaller is missing."
             )
         if self.verdict == "partly explained":
-            left = f"That is not all: on held-out parts {self.gain.rest:.3g} times what noise makes is left"
+            left = f"That is not all: {self.gain.told_rest} on held-out parts"
             said.append(left + ("; its structure: " + describe(self.structure) if self.structure else "") + ".")
         if self.verdict == "unexplained":
             none = (

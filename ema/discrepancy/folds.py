@@ -113,7 +113,7 @@ class Folds:
 
     def sentence(self, scale: float, unit: str) -> str:
         """The gain with its error, in words."""
-        gain, error = (f"{scale * abs(x):.3g}" for x in (self.gain, self.gain_error))
+        gain, error = (_short(scale * abs(x)) for x in (self.gain, self.gain_error))
         how = "better" if self.gain >= 0.0 else "worse"
         return (
             f"Held out one by one, {len(self.names)} parts are foretold {how} by {gain} ± {error} {unit}; "
@@ -136,6 +136,11 @@ class Folds:
                 for name, before, after, floor in self.rows()
             ],
         }
+
+
+def _short(x: float) -> str:
+    """Three digits, without a power of ten."""
+    return f"{x:.3g}" if x < 999.5 or not np.isfinite(x) else f"{x:.0f}"
 
 
 def _finite(x: float) -> float | None:

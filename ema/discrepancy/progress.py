@@ -39,10 +39,12 @@ class Progress:
     ----------
     say : callable
         Takes one line of text.
+    pass_by : callable, optional
+        The same for what is only tried, or does not lead: what is worth a look and no line. Like `say` if not given.
     """
 
-    def __init__(self, say: Callable[[str], None] = lambda text: None):
-        self.say = say
+    def __init__(self, say: Callable[[str], None] = lambda text: None, pass_by: Callable[[str], None] | None = None):
+        self.say, self.pass_by = say, pass_by or say
         self.tried: list[Fitted] = []
         self._begun = time.monotonic()
 
@@ -58,7 +60,8 @@ class Progress:
         self.tried.append(Fitted(tuple(names), left, dict(values), by))
         last, (first, *_) = self.tried[-1], self.leading()
         lead = "" if first is last else f"; leading: {first.said}, {first.left:.3g}"
-        self.say(f"{last.said}: leaves {left:.3g} of held-out parts{lead}")
+        tell = self.say if first is last else self.pass_by
+        tell(f"{last.said}: leaves {left:.3g} of held-out parts{lead}")
 
     def leading(self) -> list[Fitted]:
         """The best fit of each set of effects, by what the last one was weighed by, best first."""

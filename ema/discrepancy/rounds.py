@@ -180,7 +180,7 @@ def _round(
             everything += plant.structure(point, blocks)
         return [c for c in everything if only is None or c.key in only]
 
-    trials = fit_with_each(plant, model, suggest, lambda key: progress(f"round {number}: {key}"))
+    trials = fit_with_each(plant, model, suggest, lambda key: progress.pass_by(f"round {number}: {key}"))
     scale = min((t.scale for t in trials.values()), default=1.0)
     for key, trial in trials.items():
         gain = compare(trial, model, scale)

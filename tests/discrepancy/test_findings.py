@@ -11,6 +11,7 @@ from ema.core import resources
 from ema.core.errors import ConfigError
 from ema.core.version import version
 from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
+from ema.discrepancy.folds import Folds
 from ema.discrepancy.report import write_report
 from ema.effects import registry
 
@@ -24,6 +25,8 @@ def test_only_a_residual_that_is_noise_is_called_noise():
     assert "agrees" not in rest
     assert "1.12 times the noise" in rest
     assert "not noise" in rest
+    (small,) = Findings("adequate", [], GAIN, rest=0.96).sentences()
+    assert "no larger than noise" in small
 
 
 def test_a_rest_beside_a_cause_is_told_where_it_can_be_seen():
@@ -31,6 +34,23 @@ def test_a_rest_beside_a_cause_is_told_where_it_can_be_seen():
     (rest,) = Findings("explained", [], GAIN, rest=2.0).sentences()
     assert "2 times the noise" in rest
     assert Findings("explained", [], GAIN, rest=2.0).as_dict()["rest"] == 2.0
+
+
+def test_a_cause_is_told_with_its_confidence_and_intervals():
+    stiffness = {"stiffness": Quantity(2.0, 1.5, 2.5, "N m/rad"), "shape": Quantity(0.5, 0.5, 0.5, "1")}
+    effect = FoundEffect("spring_load", 0.97, (), stiffness, "a spring", "slow motion")
+    (said,) = Findings("explained", [effect], GAIN).sentences(numbers=True)
+    assert said == "A spring. [P 0.97; stiffness 2 (1.5 … 2.5) N m/rad, shape 0.5]"
+    pair = FoundEffect("spring_load", 0.48, ("inertia",), {}, "a spring", "slow motion")
+    assert pair.numbers == " [P 0.96 for the set]"
+
+
+@pytest.mark.parametrize(("of_error", "of_residual", "said"), [(0.2, 1.1, "error"), (0.1, 1.4, "residual")])
+def test_of_two_rests_the_larger_is_told_and_which_it_is(of_error, of_residual, said):
+    residual = Folds(("a",), (9.0,), (of_residual**2,), (1.0,), (1.0,))
+    gain = Gain(1.0, 0.1, 1.0, of_error, 0.1, residual=residual)
+    assert gain.told_rest.startswith(f"{max(of_error / 0.1, of_residual):.3g} times")
+    assert said in gain.told_rest
 
 
 def test_a_set_is_as_sure_as_its_members_together():

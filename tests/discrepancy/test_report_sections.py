@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from axe_look import BROWSER, look
+from ema_postflight.discrepancy import list_leading
 
 from ema.discrepancy.findings import Findings, FoundEffect, Gain, Quantity
 from ema.discrepancy.folds import Folds
@@ -88,3 +89,20 @@ def test_what_was_weighed_by_another_noise_does_not_lead():
     progress.fitted(("spring_load",), 4.0, {}, by="this noise")
     assert [t.said for t in progress.leading()] == ["no effect", "spring_load"]
     assert told[-1] == "spring_load: leaves 4 of held-out parts; leading: no effect, 3"
+
+
+def test_only_what_leads_gets_a_line_where_the_rest_may_pass_by():
+    told, passed = [], []
+    progress = Progress(told.append, passed.append)
+    progress.fitted((), 3.0, {})
+    progress.fitted(("spring_load",), 4.0, {})
+    progress.fitted(("cogging",), 2.0, {})
+    assert [text.split(":")[0] for text in told] == ["no effect", "cogging"]
+    assert [text.split(":")[0] for text in passed] == ["spring_load"]
+
+
+def test_sets_of_the_same_names_are_one_line_of_probability():
+    """Two lines of other orders are two sets, and were told as "cogging 0.60, cogging 0.30"."""
+    sets = [{"effects": names, "probability": p} for names, p in ((["cogging"], 0.6), (["cogging"], 0.3), ([], 0.1))]
+    findings = Findings("explained", [], Gain(1.0, 0.1, 1.0, 0.1, 0.1), posterior=sets)
+    assert list_leading(findings) == ["Probabilities of the sets fitted: cogging 0.90, faults alone 0.10."]

@@ -1,0 +1,59 @@
+"""Write docs/effects.md from the library: `python tools/effect_reference.py`. A test says when it is out of date."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+from ema.core.names import FAULTS
+from ema.effects import registry
+from ema.effects.base import Effect
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "effects.md"
+PLANTS = {"ema": "actuator", "axis": "axis"}
+PLACES = {"plant": "the plant", "loop": "a signal of the control loop", "recorder": "the recorder alone"}
+
+
+def page() -> str:
+    """The whole page."""
+    return "\n".join(_lines(sorted(registry().values(), key=lambda effect: effect.name))) + "\n"
+
+
+def _lines(effects: list[Effect]) -> Iterator[str]:
+    yield "# Effects"
+    yield ""
+    yield "Written by `tools/effect_reference.py` from `ema/effects/`: change those files, not this one."
+    yield ""
+    yield "What `ema discrepancy` can name, and what a plant file may hold under `effects:` ([another plant](axis.md),"
+    yield "[the actuator](discrepancy.md)). At the value in *off* a plant is as without the effect. What lies beyond"
+    yield "*searched* may be written into a plant file, but is not looked for. `ema discrepancy --explain NAME` tells"
+    yield "of one of them why it is not the answer."
+    for effect in effects:
+        yield ""
+        yield f"## {effect.name}"
+        yield ""
+        said = (import_module(f"ema.effects.{effect.name}").__doc__ or "").split("\n\n")[0].replace("\n", " ")
+        plants = " and ".join(PLANTS[plant] for plant in effect.plants)
+        yield f"{said} Acts on {PLACES[effect.place]}; {plants}. Told from others by {effect.separated_by}."
+        faults = [name for name in effect.mistaken_for if name in FAULTS]
+        if faults and "ema" in effect.plants:
+            yield f"A monitor without it would report {', '.join(faults)}."
+        if effect.is_table:
+            yield "A table of values, of no known cause."
+            continue
+        yield ""
+        yield "| parameter | unit | off | searched | meaning |"
+        yield "|---|---|---|---|---|"
+        for p in effect.parameters:
+            yield f"| {p.name} | {p.unit} | {p.neutral:g} | {p.low:g} … {p.high:g} | {p.meaning} |"
+
+
+def main() -> None:
+    """Write the page."""
+    PAGE.write_text(page(), encoding="utf-8")
+    print(PAGE)
+
+
+if __name__ == "__main__":
+    main()
