@@ -43,7 +43,7 @@ def interrupted_at(bench, out, text, times=1, by=signal.SIGINT):
     return process.returncode, said
 
 
-@pytest.mark.parametrize(("times", "by"), [(1, signal.SIGINT), (5, signal.SIGINT), (3, signal.SIGTERM)])
+@pytest.mark.parametrize(("times", "by"), [(1, signal.SIGINT), (4, signal.SIGINT), (3, signal.SIGTERM)])
 def test_what_leads_is_written_and_marked(bench, tmp_path, times, by):
     status, said = interrupted_at(bench, tmp_path / "out", "of held-out parts", times, by)
     assert status == 130
