@@ -135,22 +135,26 @@ def test_a_line_along_a_travel_may_lie_between_those_that_are_tried(between):
     assert found["amplitude"] == pytest.approx(0.05, rel=0.05)
 
 
-@pytest.mark.parametrize(("family", "key"), [("stribeck", "speed"), ("friction with memory", "deflection")])
-def test_a_law_of_a_family_of_few_may_lie_between_its_members_and_its_interval_says_so(family, key):
+BETWEEN = [("stribeck", "speed", s) for s in (-1.0, 0.0, 0.5, 1.0)] + [("friction with memory", "deflection", 0.0)]
+
+
+@pytest.mark.parametrize(("family", "key", "shape"), BETWEEN)
+def test_a_law_of_a_family_of_few_may_lie_between_its_members_and_its_interval_says_so(family, key, shape):
     """The way of bristles was told as 0.11344 ± 0 rad: the member that left least was alone in its interval."""
     m = motion()
     every = [law for law in laws(m, linear=False) if law.family == family]
-    truth = every[len(every) // 2].around(0.4)[1]
+    own = [law for law in every if law.values(np.ones(1)).get("shape", 0.0) == np.ceil(shape)]
+    truth = own[len(own) // 2].among.moved(np.array([0.4, shape - np.ceil(shape)][: len(own[0].among.at)]))
     hidden, held = truth.values(np.ones(1))[key], 0
     for seed in range(20):
         made = rows(m, torque=0.04 * truth.columns(m, acting(m))[0], noise=0.003, seed=seed)
         b = choose_laws(made, PLAIN, every)
         (term,) = b.terms
         low, high = np.quantile([law.values(c)[key] for law, c in draw_law(b, term)], (0.025, 0.975))
-        assert term.law.values(np.ones(1))[key] == pytest.approx(hidden, rel=0.2)
-        assert high < 1.4 * low
-        held += int(low < hidden < high)
-    assert held >= 15  # 85 to 88 % of sixty are held
+        assert term.law.values(np.ones(1))[key] == pytest.approx(hidden, rel=0.25)
+        assert high < 1.5 * low
+        held += int(low <= hidden <= high)
+    assert held >= 16  # 88 to 95 % of forty are held
 
 
 def made_of(made, law):

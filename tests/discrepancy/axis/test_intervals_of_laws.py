@@ -16,7 +16,7 @@ def fit(inertia):
 
 
 def test_the_rest_is_as_often_what_it_is_beside_a_rival_as_the_rival_wins():
-    term = SimpleNamespace(instead=(fit(3.0), fit(5.0)), alike={"one": 0.3, "other": 0.2})
+    term = SimpleNamespace(instead=(fit(3.0), fit(5.0)), alike={"one": 0.3, "other": 0.2}, members=())
     corrected = SimpleNamespace(coefficients=np.array([1.0]), covariance=np.array([[1e-6]]))
     drawn = draw(SimpleNamespace(model=fit(1.0), corrected=corrected, terms=(term,)))[:, 0]
     shares = [np.mean(np.abs(drawn - inertia) < 0.1) for inertia in (1.0, 3.0, 5.0)]

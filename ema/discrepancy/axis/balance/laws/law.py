@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+import numpy as np
+
 from ema.core.records import Array
 
 if TYPE_CHECKING:
@@ -59,7 +61,7 @@ class Law:
         The law of which it has the columns once for each record.
     finer : function share → laws
         Of a family whose members stand for all between them: those that lie this share of a step to both sides.
-    around : function share → laws
+    among : Among or None
         The same of a family of few members: asked for once the law is chosen, so that no finer member chooses it.
     freer : function (motion, acting) → arrays of shape (n_samples,)
         Of what has no name, and so no form: columns of the same with twice the freedom.
@@ -80,20 +82,31 @@ class Law:
     repeats: Law | None = None
     weak: Callable[[Motion], Sequence[tuple[Array, Array]]] | None = None
     finer: Callable[[float], Sequence[Law]] | None = None
-    around: Callable[[float], Sequence[Law]] | None = None
+    among: Among | None = None
     freer: Columns | None = None
 
 
-def members_around(
-    member: Callable[[float], Law], at: float, step: float, ends: tuple[float, float]
-) -> Callable[[float], Sequence[Law]]:
-    """`around` of a family along one size: what lies a share of a `step`, a factor, to both sides, between `ends`."""
+@dataclass(frozen=True)
+class Among:
+    """Where a law stands in a family that goes on between its members.
 
-    def around(share: float) -> list[Law]:
-        near = (at * step**side for side in (-share, share))
-        return [member(x) for x in near if ends[0] <= x <= ends[1]]
+    Parameters
+    ----------
+    at : array, shape (n_sizes,)
+        Its sizes, in steps from one member to the next.
+    ends : array, shape (n_sizes, 2)
+        Of the family, in the same.
+    member : function array → Law
+        The law of other sizes.
+    """
 
-    return around
+    at: Array
+    ends: Array
+    member: Callable[[Array], Law]
+
+    def moved(self, by: Array) -> Law:
+        """The member so many steps away, or at the family's end."""
+        return self.member(np.clip(self.at + by, *self.ends.T))
 
 
 def one(name: str, **shape: float) -> Values:

@@ -6,6 +6,7 @@ side, and its best member competes with other laws.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -15,13 +16,14 @@ from ema.effects.stribeck import fade
 
 from .along import by_position
 from .drifting import drift_laws
-from .law import Acting, Columns, Law, members_around, one
+from .law import Acting, Among, Columns, Law, one
 from .links import coupled_friction
 from .memory import memory_laws
 from .motion import Motion
 from .units import LINEAR, ROTARY, Units
 
 N_SPEEDS = 14  # members of a family
+SHAPES = (-1.0, 0.0, 1.0)  # by which friction falls, see `ema.effects.stribeck`
 SEEN_BOTH = 0.1  # share of the samples in which a drive must act each way
 ROUNDING = 1e-9  # of the drive's torque: no load is less than this, where there is one
 
@@ -85,17 +87,16 @@ def _by_speed(m: Motion, u: Units) -> Iterator[Law]:
     if not w.size or np.quantile(w, 0.05) > 0.5 * w.max():
         return
     low, high = max(float(np.quantile(w, 0.02)), 0.005 * float(w.max())), 0.4 * float(w.max())
-    if high > low:
-        step = (high / low) ** (1.0 / (N_SPEEDS - 1))
-        for over in np.geomspace(low, high, N_SPEEDS):
-            yield from (_stribeck(float(over), shape, step, (low, high), u) for shape in (0.0, 1.0))
+    for over in np.geomspace(low, high, N_SPEEDS) if high > low else ():
+        yield from (_stribeck(float(over), shape, (low, high), u) for shape in SHAPES)
 
 
-def _stribeck(over: float, shape: float, step: float, ends: tuple[float, float], u: Units) -> Law:
-    """Friction that fades over a speed between `ends`; the family's next members fade over `step` times as much."""
+def _stribeck(over: float, shape: float, ends: tuple[float, float], u: Units) -> Law:
+    """Friction that fades over a speed between `ends`, by a shape between the first and the last of `SHAPES`."""
+    step = math.log(ends[1] / ends[0]) / (N_SPEEDS - 1)
     return Law(
         "stribeck",
-        f"stribeck {over:.8g} {shape:g}",
+        f"stribeck {over:.8g} {shape:.6g}",
         "stribeck",
         _falling(over, shape),
         {"more": u.torque, "speed": u.speed, "shape": "1"},
@@ -103,7 +104,11 @@ def _stribeck(over: float, shape: float, step: float, ends: tuple[float, float],
         f"friction changes with speed, {{more:+.3g}} {u.torque} at rest, fading over {{speed:.3g}} {u.speed}",
         "slow motion at several constant speeds",
         is_friction=True,
-        around=members_around(lambda x: _stribeck(x, shape, step, ends, u), over, step, ends),
+        among=Among(
+            np.array([math.log(over) / step, shape]),
+            np.array([np.log(ends) / step, (SHAPES[0], SHAPES[-1])]),
+            lambda at: _stribeck(math.exp(at[0] * step), float(at[1]), ends, u),
+        ),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from ema.core.records import Array
 from ema.effects.friction_memory import built_up
 
-from .law import Columns, Law, members_around, one
+from .law import Among, Columns, Law, one
 from .motion import Motion
 
 SHORTEST, LONGEST, N_WAYS = 0.004, 0.5, 12  # of the way between two reversals; members of the family between these
@@ -23,16 +24,14 @@ def memory_laws(m: Motion, torque: str, place: str) -> Iterator[Law]:
     new = np.diff(m.t, prepend=m.t[0] - 1.0)
     begins = (new <= 0.0) | (new > GAP * float(np.median(new))) | m.static
     stroke = _stroke(m, begins)
-    step = (LONGEST / SHORTEST) ** (1.0 / (N_WAYS - 1))
     ends = SHORTEST * stroke, LONGEST * stroke
     for way in np.geomspace(*ends, N_WAYS) if stroke > 0.0 else ():
-        yield _memory(begins, float(way), step, ends, torque, place)
+        yield _memory(begins, float(way), ends, torque, place)
 
 
-def _memory(
-    begins: NDArray[np.bool_], way: float, step: float, ends: tuple[float, float], torque: str, place: str
-) -> Law:
-    """Friction that builds up over a `way` between `ends`; the family's next members are `step` times as long."""
+def _memory(begins: NDArray[np.bool_], way: float, ends: tuple[float, float], torque: str, place: str) -> Law:
+    """Friction that builds up over a `way` between `ends`."""
+    step = math.log(LONGEST / SHORTEST) / (N_WAYS - 1)
     return Law(
         "friction with memory",
         f"memory {way:.8g}",
@@ -44,7 +43,11 @@ def _memory(
         f"{{deflection:.3g}} {place} (presliding)",
         "small reversing motions of several amplitudes at several frequencies",
         is_friction=True,
-        around=members_around(lambda x: _memory(begins, x, step, ends, torque, place), way, step, ends),
+        among=Among(
+            np.array([math.log(way) / step]),
+            np.log([ends]) / step,
+            lambda at: _memory(begins, math.exp(at[0] * step), ends, torque, place),
+        ),
     )
 
 

@@ -60,7 +60,7 @@ def by_record(law: Law, n_records: int) -> Law:
         n_columns=n_records * law.n_columns,
         repeats=law,
         finer=None,
-        around=None,
+        among=None,
     )
 
 

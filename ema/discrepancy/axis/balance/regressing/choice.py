@@ -13,6 +13,7 @@ from ema.discrepancy.axis.balance.laws.law import BY_RECORD, BY_RECORD_NAME, Law
 from ema.discrepancy.axis.balance.laws.links import LINKS
 
 from .found import Balance, Term
+from .members import N_FINER, draw_members, fit_sizes, members_around
 from .needed import ALARM, SIMPLER, Asked, chance, families_held, is_needed, simpler_families
 from .regression import Corrected, Plain, Regression, is_machine, regress
 from .rows import Rows
@@ -20,7 +21,6 @@ from .rows import Rows
 MOST_LAWS = 8  # a series of lines is one
 MOST_LINES = 16  # of one series: each takes a tenth at least of what those before it left
 SELDOM = 0.05  # share of draws that another law must win to be one that the records cannot tell
-N_FINER = 9  # times that the step between members of a family is halved
 N_DRAWS = 400  # of blocks, to see how often a law wins
 N_NEAR = 16  # members of a family that are asked how often each leaves least
 EQUAL = 1e-9  # share by which rounding tells two columns apart that are one on these records: the first is taken
@@ -114,16 +114,12 @@ def _add(model: Regression, law: Law) -> list[Law]:
     return [*(own for own in model.laws if law.repeats is None or own.key != law.repeats.key), law]
 
 
-def _best(found: Rows, model: Regression, members: Sequence[Law], *, chosen: bool = False) -> Law:
-    """The member of a family whose columns take most of what is left, or one that lies between two members.
-
-    Where the law is `chosen` already, of a family of few members too.
-    """
+def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
+    """The member of a family whose columns take most of what is left, or one that lies between two members."""
     best = _best_of(found, model, members)
     for k in range(1, N_FINER + 1):
-        between = best.finer or (best.around if chosen else None)
-        if between is not None:
-            best = _best_of(found, model, [best, *between(0.5**k)])
+        if best.finer is not None:
+            best = _best_of(found, model, [best, *best.finer(0.5**k)])
     return best
 
 
@@ -154,7 +150,8 @@ def _best_members(found: Rows, plain: Plain, model: Regression, every: Sequence[
         without = regress(found, plain, [own for own in model.laws if own.key != law.key])
         members = [own for own in every if own.family == law.family] or [law]
         same = [own for own in members if own.name == law.name]
-        other = regress(found, plain, _add(without, _best(found, without, same or [law], chosen=True)))
+        best = _best(found, without, same or [law]) if law.among is None else fit_sizes(found, without, same)
+        other = regress(found, plain, _add(without, best))
         model = other if other.loss < model.loss else model
         for own in members if law.needs_acting else ():
             other = regress(found, plain, _add(without, own))
@@ -251,15 +248,14 @@ def _near_members(
     if law.family in LINES and law.finer is None:
         return ()
     same = [own for own in every if own.family == law.family and own.name == law.name]
-    between = law.finer or law.around
-    same += [own for k in range(1, N_FINER + 1) if between is not None for own in between(0.5**k)]
-    same = [own for own in same if own.key != law.key]
-    if not same:
-        return ()
-    near = np.argsort(-_gains(found, without, same))[:N_NEAR]
-    fits = {same[k].key: regress(found, plain, _add(without, same[k])) for k in near}
-    wins = _wins(law.key, model, fits)
-    return tuple((fit, wins[key]) for key, fit in fits.items() if wins[key] > 0.0)
+    if law.among is not None:
+        near = members_around(found, without, law, same)
+    else:
+        same += [own for k in range(1, N_FINER + 1) if law.finer is not None for own in law.finer(0.5**k)]
+        near = [same[k] for k in np.argsort(-_gains(found, without, same))[:N_NEAR]] if same else []
+    near = [law, *(own for own in near if own.key != law.key)]
+    drawn = np.bincount(draw_members(found, without, near, N_DRAWS), minlength=len(near)) / N_DRAWS
+    return tuple((regress(found, plain, _add(without, near[k])), float(drawn[k])) for k in np.flatnonzero(drawn) if k)
 
 
 def _simpler_ways(found: Rows, plain: Plain, without: Regression, law: Law, every: Sequence[Law]) -> list[Regression]:

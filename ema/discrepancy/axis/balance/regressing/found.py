@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ema.core.records import Array
 from ema.discrepancy.axis.balance.laws.law import BY_RECORD
@@ -120,15 +122,15 @@ class Balance:
 def draw(b: Balance) -> Array:
     """Coefficients drawn from their uncertainty, shape (N_DRAWS, n): also from what the balance cannot tell from a law.
 
-    With another law in the place of one, as often as it wins, the rest are what they are beside that one.
+    With another law in the place of one, or another member of its family, as often as it wins, the rest are what they
+    are beside that one.
     """
     rng = np.random.default_rng(0)
     out = rng.multivariate_normal(b.corrected.coefficients, b.corrected.covariance, N_DRAWS, method="eigh")
-    for term in b.terms:
-        lots = rng.random(N_DRAWS)
-        for rival, wins in zip(term.instead, term.alike.values(), strict=True):
-            out[lots < wins] += _moved(b.model, rival)
-            lots = np.where(lots < wins, 2.0, lots - wins)
+    for k, term in enumerate(b.terms):
+        others = [(rival, term.alike[name]) for rival, name in zip(term.instead, term.alike, strict=True)]
+        for at, other in (*_draw_others(others, (0, k)), *_draw_others(term.members, (1, k))):
+            out[at] += _moved(b.model, other)
     return np.asarray(out)
 
 
@@ -137,14 +139,24 @@ def draw_law(b: Balance, term: Term) -> list[tuple[Law, Array]]:
     part = b.model.part(term.law)
     own = draw(b)[:, part]
     out = [(term.law, c) for c in own]
-    lots = np.random.default_rng(1).random(N_DRAWS)
-    for fit, wins in term.members:
-        law = fit.laws[-1]
-        moved = fit.coefficients[fit.part(law)] - b.model.coefficients[part]
-        for k in np.flatnonzero(lots < wins):
+    for at, other in _draw_others(term.members, (1, b.terms.index(term))):
+        law = other.laws[-1]
+        moved = other.coefficients[other.part(law)] - b.model.coefficients[part]
+        for k in at:
             out[k] = (law, own[k] + moved)
-        lots = np.where(lots < wins, 2.0, lots - wins)
     return out
+
+
+def _draw_others(
+    others: Sequence[tuple[Regression, float]], seed: tuple[int, int]
+) -> list[tuple[NDArray[np.intp], Regression]]:
+    """In which of the draws each stands in the place of a law, by its share of them."""
+    lots = np.random.default_rng(seed).random(N_DRAWS)
+    ends = np.cumsum([0.0, *(share for _, share in others)])
+    return [
+        (np.flatnonzero((low <= lots) & (lots < high)), r)
+        for (r, _), low, high in zip(others, ends[:-1], ends[1:], strict=True)
+    ]
 
 
 def _moved(model: Regression, rival: Regression) -> Array:
