@@ -50,3 +50,18 @@ def test_a_law_of_one_number_leaves_that_to_the_fit():
     """A real servo's balance held quadratic drag beside its free runs, and nothing of it was free: a traceback."""
     law = begin_at("quadratic_drag", {"coefficient": 2e-4}, {}, 6.0)
     assert [f.name for f in law.free] == ["quadratic_drag.coefficient"]
+
+
+def test_what_the_balance_shows_by_one_way_of_the_drive_is_tried_by_another_too(plant):
+    """A held drive bent it, and a motor that saturates was alone with what friction by its torque squared does."""
+    shown = plant.balance
+    assert plant.between == "held"
+    plant._balances["straight"] = replace(shown, terms=())
+    way, plant.between = plant.between, "straight"
+    point = {f.name: f.start for f in plant.base}
+    try:
+        assert plant.balance.terms == ()
+        assert {MOTOR, LOAD} <= {c.key for c in plant.candidates(point, range(len(plant.blocks)))}
+    finally:
+        plant.between = way
+        del plant._balances["straight"]

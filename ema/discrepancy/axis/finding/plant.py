@@ -123,7 +123,20 @@ class AxisPlant:
         """Library effects with bounds and starts for this axis."""
         if self.is_linked:
             return []
-        return [*candidates.library(self, point, blocks), *suggest_by_balance(self.balance, self.plant, point)]
+        return [*candidates.library(self, point, blocks), *self._suggest(point)]
+
+    def _suggest(self, point: Point) -> list[Candidate]:
+        """What the balance needs, by the drive as it is taken now and as it was taken before.
+
+        With the drive taken another way the balance may do without a law: then free runs must tell it from what fits
+        as well, as a motor that saturates and friction by the square of its torque do.
+        """
+        ways = [self.balance, *(b for way, b in self._balances.items() if way != self.between)]
+        found: dict[str, Candidate] = {}
+        for b in ways:
+            for c in suggest_by_balance(b, self.plant, point):
+                found.setdefault(c.key, c)
+        return [*found.values()]
 
     def seen_together(self, point: Point) -> list[Candidate]:
         """Effects that channels and the balance of torque show beside each other, begun where these have them."""
