@@ -286,7 +286,7 @@ def _said(effect: FoundEffect, again: bool = False) -> str:
         text = f"Perhaps, with a confidence of {odds:.0%} only: {which}"
         text += f", {effect.sentence}" if others else ""
     if others:
-        text += f"; or {' or '.join(others)} (told apart {how})"
+        text += f"; or {' or '.join(others)}, or some of each (told apart {how})"
     elif odds < SURE:
         text += f" (to be confirmed {how})"
     return text + "."

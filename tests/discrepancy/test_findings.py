@@ -60,9 +60,10 @@ def test_a_set_is_as_sure_as_its_members_together():
 
     assert said(0.95) == "A spring."
     assert said(0.6) == "Perhaps, with a confidence of 60% only: a spring (to be confirmed by slow motion)."
-    one_of = "One of 2 that fit alike, this record cannot tell which: a spring; or inertia (told apart by slow motion)."
+    others = "; or inertia, or some of each (told apart by slow motion)."
+    one_of = f"One of 2 that fit alike, this record cannot tell which: a spring{others}"
     assert said(0.49, "inertia") == one_of
-    perhaps = "Perhaps, with a confidence of 20% only: one of these, a spring; or inertia (told apart by slow motion)."
+    perhaps = f"Perhaps, with a confidence of 20% only: one of these, a spring{others}"
     assert said(0.1, "inertia") == perhaps
 
 
