@@ -62,7 +62,8 @@ HOOKS = MappingProxyType(
 
 
 T_REFERENCE = 20.0  # [°C] winding temperature that a plant's numbers belong to
-ABSENT = -1.0  # as the low end of a relative change: nothing is left, which is credible
+ONE_STEP = 1e-6  # [s] within which simulations sample, decide and act in one order or another
+ABSENT = -1.0  # a relative change: nothing is left
 
 
 class Limit(NamedTuple):
@@ -83,7 +84,8 @@ NOT_REVERSED = Limit("at least -1", lambda x: x >= ABSENT)
 class Parameter:
     """One number of an effect: `neutral` switches the effect off, `low`..`high` is what is physically credible.
 
-    `start` is where a search begins (never the neutral value where the effect has no slope there).
+    `start` is where a search begins (never the neutral value where the effect has no slope there). Where `low` or
+    `high` is in `laws_at`, a law ends there and not what somebody held credible: a fit may well go there.
     """
 
     name: str
@@ -93,6 +95,7 @@ class Parameter:
     high: float
     start: float
     meaning: str
+    laws_at: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,8 @@ class Effect:
     limits : mapping of str to Limit
         Of parameters that cannot have just any value.
     least_sd : mapping of str to float
-        Standard deviation below which no estimate is claimed, where honest simulations of the same law differ by it.
+        Standard deviation below which no estimate is claimed, where honest simulations of the same law differ by it;
+        nor is an effect, within a few of these.
     place : str
         Where it acts: in the ``plant``, on a signal of the control ``loop``, or in the ``recorder`` alone, which the
         controller does not notice.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .base import SHARE, Effect, Parameter
+from .base import ONE_STEP, SHARE, Effect, Parameter
 from .search import AxisSizes, Look, Span
 
 
@@ -16,6 +16,8 @@ def on_axis(s: AxisSizes) -> Mapping[str, Span]:
     """Where a search begins, by what the records hold."""
     return {"rate": Span(-0.05, 0.05, (0.002,), 0.002)}
 
+
+CYCLE = 0.5  # [s] over which a clock that is off by so much is a step off
 
 EFFECT = Effect(
     name="clock_skew",
@@ -36,6 +38,7 @@ EFFECT = Effect(
     mistaken_for=("k1", "k2"),
     plants=("ema", "axis"),
     limits={"rate": SHARE, "shared": SHARE, "currents": SHARE},
+    least_sd={**dict.fromkeys(("rate", "shared", "currents"), ONE_STEP / CYCLE), "late": ONE_STEP},
     place="recorder",
     looks=(
         Look("rate", steps={"rate": 1e-4}),

@@ -19,6 +19,7 @@ EFFECT = Effect(
             3.0,
             0.3,
             "relative change of the time constants of the anti-alias stages; -1: none",
+            laws_at=(ABSENT,),
         ),
     ),
     sentence="the time constants of the anti-alias filter of the recorded currents differ by {change:+z.0%}",

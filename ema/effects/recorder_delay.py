@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import NOT_NEGATIVE, Effect, Parameter
+from .base import NOT_NEGATIVE, ONE_STEP, Effect, Parameter
 from .search import Look
 
 EFFECT = Effect(
@@ -13,6 +13,7 @@ EFFECT = Effect(
     mistaken_for=("k2",),
     plants=("ema",),
     limits={"time": NOT_NEGATIVE},
+    least_sd={"time": ONE_STEP},
     place="recorder",
     looks=(Look("time"),),
 )

@@ -8,14 +8,14 @@ from .base import NOT_NEGATIVE, Effect, Parameter
 from .search import AxisSizes, Look, Span
 
 
-def emf_factor(i_j, dT, emf, inductance, per_ampere):
+def emf_factor(i_j, dT, emf, inductance, per_ampere, inductance_per_ampere):
     """κ × 1 / (1 + α |i| + β i²): iron that gives way from the first ampere on, or later."""
     return 1.0 / (1.0 + abs(i_j) * (per_ampere + emf * abs(i_j)))
 
 
-def inductance_factor(i_j, emf, inductance, per_ampere):
-    """L × 1 / (1 + γ i²)"""
-    return 1.0 / (1.0 + inductance * i_j * i_j)
+def inductance_factor(i_j, emf, inductance, per_ampere, inductance_per_ampere):
+    """L × 1 / (1 + δ |i| + γ i²)"""
+    return 1.0 / (1.0 + abs(i_j) * (inductance_per_ampere + inductance * abs(i_j)))
 
 
 def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
@@ -34,15 +34,20 @@ EFFECT = Effect(
         Parameter("emf", "1/A^2", 0.0, 0.0, 0.005, 0.0004, "relative loss of torque constant per current squared"),
         Parameter("inductance", "1/A^2", 0.0, 0.0, 0.01, 0.001, "relative loss of inductance per current squared"),
         Parameter("per_ampere", "1/A", 0.0, 0.0, 0.05, 0.004, "relative loss of torque constant per current"),
+        Parameter("inductance_per_ampere", "1/A", 0.0, 0.0, 0.1, 0.008, "relative loss of inductance per current"),
     ),
-    sentence="magnetic saturation: the torque constant falls by {emf:.2g} per A², "
-    "the inductance by {inductance:.2g} per A²",
-    besides={"per_ampere": ", and the torque constant by {per_ampere:.2g} per A more"},
+    sentence="magnetic saturation:",
+    besides={
+        "emf": " the torque constant falls by {emf:.2g} per A²",
+        "per_ampere": " the torque constant falls by {per_ampere:.2g} per A",
+        "inductance": " the inductance falls by {inductance:.2g} per A²",
+        "inductance_per_ampere": " the inductance falls by {inductance_per_ampere:.2g} per A",
+    },
     separated_by="motions with high and low acceleration",
     laws={"emf_factor": emf_factor, "inductance_factor": inductance_factor},
     mistaken_for=("k3", "k4", "k5"),
     plants=("ema", "axis"),
-    limits=dict.fromkeys(("emf", "inductance", "per_ampere"), NOT_NEGATIVE),
-    looks=(Look("emf", "inductance"),),
+    limits=dict.fromkeys(("emf", "inductance", "per_ampere", "inductance_per_ampere"), NOT_NEGATIVE),
+    looks=(Look("emf", "inductance"), Look("per_ampere", "inductance_per_ampere")),
     on_axis=on_axis,
 )

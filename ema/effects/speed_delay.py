@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .base import NOT_NEGATIVE, Effect, Parameter
+from .base import NOT_NEGATIVE, ONE_STEP, Effect, Parameter
 from .search import AxisSizes, Look, Span
 
 
@@ -23,6 +23,7 @@ EFFECT = Effect(
     mistaken_for=("k1",),
     plants=("ema", "axis"),
     limits={"time": NOT_NEGATIVE},
+    least_sd={"time": ONE_STEP},
     place="loop",
     looks=(Look("time"),),
     on_axis=on_axis,

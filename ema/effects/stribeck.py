@@ -39,7 +39,14 @@ EFFECT = Effect(
             "speed", "rad/s", 10.0, 0.5, 80.0, 10.0, "speed over which the excess fades to 1/e, at shape -1 to one half"
         ),
         Parameter(
-            "shape", "1", 0.0, -1.0, 1.2, 0.5, "how it fades: -1 as 1/(1 + x²), 0 exponentially, 1 as a Gaussian"
+            "shape",
+            "1",
+            0.0,
+            -1.0,
+            1.2,
+            0.5,
+            "how it fades: -1 as 1/(1 + x²), 0 exponentially, 1 as a Gaussian",
+            laws_at=(-1.0,),
         ),
     ),
     sentence="Stribeck friction: sliding friction {excess} higher at low speed, fading over {speed:.3g} rad/s",
@@ -48,5 +55,9 @@ EFFECT = Effect(
     mistaken_for=("k1",),
     plants=("ema", "axis"),
     limits={"excess": NOT_REVERSED, "speed": POSITIVE},
-    looks=tuple(Look("excess", at={"speed": speed, "shape": 0.5}) for speed in (4.0, 15.0, 40.0)),
+    looks=tuple(
+        Look("excess", steps={"shape": 0.1}, at={"speed": speed, "shape": shape})
+        for shape in (0.5, -1.0)  # between these less is left of either: no fit goes from one to the other
+        for speed in (4.0, 15.0, 40.0)
+    ),
 )

@@ -41,8 +41,9 @@ E_ELECTRIC, E_COPPER, E_SHAFT, E_FRICTION, E_USER = map(
 COMPLIANCE, INERTIA, DAMPING = (row(f"gear_compliance.{x}") for x in ("compliance", "inertia", "damping"))
 USER_DRAG, USER_FRICTION = row("gear_compliance.drag"), row("gear_compliance.friction")
 SOURCE_R, SOURCE_C = row("supply_sag.resistance"), row("supply_sag.capacitance")
-DEAD_TIME, DELAY = row("dead_time.time"), row("comparator_delay.time")
+DEAD_TIME, BELOW, DELAY = map(row, ("dead_time.time", "dead_time.below", "comparator_delay.time"))
 COMMUTATION, APART = map(row, ("commutation_offset.angle", "commutation_offset.apart"))
+IN_SPEED = row("resolver_error.in_speed")
 GAIN_A, GAIN_B, GAIN_C = (row(f"current_gain.gain_{j}") for j in PHASES)
 OFFSET_A, OFFSET_B, OFFSET_C = (row(f"current_offset.offset_{j}") for j in PHASES)
 
@@ -106,6 +107,7 @@ def electrical_step(z, l, N, dt, parts, audited):
         if len(parts) & INVERTER:
             late = (
                 z[OFF_A * N + l], z[OFF_B * N + l], z[OFF_C * N + l], z[DELAY * N + l], z[DEAD_TIME * N + l],
+                z[BELOW * N + l],
             )  # fmt: skip
             (n_a, n_b, n_c), (s_a, s_b, s_c), off, work, heat = currents_after(
                 currents, errors, legs, told, R, L, emf, 0.5 * u_dc, h, dt, late
@@ -120,7 +122,7 @@ def electrical_step(z, l, N, dt, parts, audited):
         s_b = comparator(z[S_B * N + l], e_b, h)
         s_c = comparator(z[S_C * N + l], e_c, h)
         if len(parts) & INVERTER:
-            dead = z[DEAD_TIME * N + l]
+            dead, below = z[DEAD_TIME * N + l], z[BELOW * N + l]
             on = z[DELAY * N + l] + dead  # from a comparator's decision until the leg is on again
             off_a = on if s_a != z[S_A * N + l] else z[OFF_A * N + l]
             off_b = on if s_b != z[S_B * N + l] else z[OFF_B * N + l]
@@ -130,9 +132,9 @@ def electrical_step(z, l, N, dt, parts, audited):
                 share_of_step(off_b - dead, dt),
                 share_of_step(off_c - dead, dt),
             )
-            v_a = leg_voltage(s_a, i_a, u_dc, late_a, share_of_step(off_a, dt) - late_a)
-            v_b = leg_voltage(s_b, i_b, u_dc, late_b, share_of_step(off_b, dt) - late_b)
-            v_c = leg_voltage(s_c, i_c, u_dc, late_c, share_of_step(off_c, dt) - late_c)
+            v_a = leg_voltage(s_a, i_a, u_dc, late_a, share_of_step(off_a, dt) - late_a, below)
+            v_b = leg_voltage(s_b, i_b, u_dc, late_b, share_of_step(off_b, dt) - late_b, below)
+            v_c = leg_voltage(s_c, i_c, u_dc, late_c, share_of_step(off_c, dt) - late_c, below)
             z[OFF_A * N + l] = max(off_a - dt, 0.0)
             z[OFF_B * N + l] = max(off_b - dt, 0.0)
             z[OFF_C * N + l] = max(off_c - dt, 0.0)
@@ -290,7 +292,8 @@ def integrate(z, command, lvdt_noise, out, history, dt, n_substeps, lanes, parts
             if len(parts) & SENSORS:
                 zero = (z[COMMUTATION * N + l] - z[APART * N + l]) / z[P * N + l]
                 error = hooks.angle_error(z, l, N, theta_m_meas) + zero
-                w_m_meas += (error - z[ANGLE_ERROR * N + l]) / T if tick > 0 else 0.0
+                rate = (error - z[ANGLE_ERROR * N + l]) / T if tick > 0 else 0.0
+                w_m_meas += z[IN_SPEED * N + l] * rate
                 z[ANGLE_ERROR * N + l] = error
                 theta_m_meas += error
                 history[0, tick % history.shape[1], l] = theta_u_meas

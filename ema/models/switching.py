@@ -47,9 +47,9 @@ def share_until_event(off_j, dead, dt):
 
 
 @_jit
-def leg(s_j, i_j, off_j, dead):
+def leg(s_j, i_j, off_j, dead, below):
     """What a leg that follows late makes of half the bus voltage: as before, by its diodes, or as it is told."""
-    return -s_j if off_j > dead else (diode(i_j) if off_j > 0.0 else s_j)
+    return -s_j if off_j > dead else (diode(i_j, below) if off_j > 0.0 else s_j)
 
 
 @_jit
@@ -73,8 +73,8 @@ def currents_after(i, e, s, told, R, L, emf, half, h, dt, late):
         Of the phases. [Ω, H, V]
     half : float
         Half of the bus voltage. [V]
-    late : empty, or three times until the legs are on, delay, and dead time
-        Where legs follow late. [s]
+    late : empty, or three times until the legs are on, delay, dead time, and the current below which it is less
+        Where legs follow late. [s, A]
 
     Returns
     -------
@@ -87,10 +87,10 @@ def currents_after(i, e, s, told, R, L, emf, half, h, dt, late):
     dt_LL = dt / (L_a * L_b + L_b * L_c + L_c * L_a)
     n_a, n_b, n_c = i
     s_a, s_b, s_c = s
-    off_a, off_b, off_c, dead, on = 0.0, 0.0, 0.0, 0.0, 0.0
+    off_a, off_b, off_c, dead, below, on = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     most = MOST_TURNS
     if len(late):
-        off_a, off_b, off_c, delay, dead = late
+        off_a, off_b, off_c, delay, dead, below = late
         on, most = delay + dead, MOST_EVENTS
     left = 1.0
     work, heat = 0.0, 0.0
@@ -98,9 +98,9 @@ def currents_after(i, e, s, told, R, L, emf, half, h, dt, late):
         v_a, v_b, v_c = half * s_a, half * s_b, half * s_c
         u_a, u_b, u_c = NEVER, NEVER, NEVER
         if len(late):
-            v_a = half * leg(s_a, n_a, off_a, dead)
-            v_b = half * leg(s_b, n_b, off_b, dead)
-            v_c = half * leg(s_c, n_c, off_c, dead)
+            v_a = half * leg(s_a, n_a, off_a, dead, below)
+            v_b = half * leg(s_b, n_b, off_b, dead, below)
+            v_c = half * leg(s_c, n_c, off_c, dead, below)
             u_a = share_until_event(off_a, dead, dt)
             u_b = share_until_event(off_b, dead, dt)
             u_c = share_until_event(off_c, dead, dt)

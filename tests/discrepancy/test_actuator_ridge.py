@@ -29,7 +29,7 @@ def test_a_magnet_is_found_between_none_of_the_shorts_and_all_of_them(shipped_pl
     data = prepare(shipped_plant, [Record(record("flux_and_faults").cycles[:4])])
     plant = EmaPlant(take_recorded_conditions(shipped_plant, data.signals)[0], data)
     search = Search(plant, Noise(plant, ALONE), *split(data))
-    by_name = {c.effect: c for c in candidates(plant.plant, data, [])}
+    by_name = {c.effect: c for c in reversed(candidates(plant.plant, data, []))}  # of saturation: by the square
     magnet, *others = probe(search, [by_name[name] for name in ("magnet_flux", "recorder_offset", "saturation")])
     model = search.model((), K_FREE, ALONE, None, 1)
     kept = sort_by_nearness(search, model, [Screened(0.0, c, {}) for c in (*others, magnet)])

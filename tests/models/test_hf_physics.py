@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from ema.core import config, resources
 from ema.effects import registry
+from ema.effects.inverter import leg_voltage
 from ema.models import hf
 from ema.models.actuator import Actuator
 from ema.models.envelope import envelope
@@ -329,3 +330,42 @@ def test_a_delay_is_as_long_as_it_is_said_at_any_rate_of_control(signal):
     never = seen(10.0)
     assert np.array_equal(never, seen(20.0))
     assert not np.array_equal(never, four)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_a_resolvers_error_is_in_the_speed_as_far_as_the_speed_comes_from_it(share):
+    wave = {"once_cosine": 0.02, "twice_sine": 0.01}
+    made = runs(effects={"resolver_error": {**wave, "in_speed": share}})
+    theta, w = made.theta_m, made.w_m
+    tick = float(np.diff(made.t)[0])
+    error = np.diff(0.02 * np.cos(theta) + 0.01 * np.sin(2.0 * theta), axis=-1) / tick
+    true = np.diff(theta, axis=-1) / tick - error
+    w = 0.5 * (w[:, 1:] + w[:, :-1])  # as true as the mean over a tick
+    error = 0.5 * (error + np.roll(error, 1, axis=-1))
+    beyond, error = (w - true)[:, 1:], error[:, 1:]
+    assert np.sum(beyond * error) / np.sum(error**2) == pytest.approx(share, abs=0.05)
+
+
+@pytest.mark.parametrize("law", ["per_ampere", "inductance_per_ampere"])
+def test_iron_that_gives_way_from_the_first_ampere_lowers_what_it_is_said_to(law):
+    """At a tenth per ampere, one ampere finds 1/1.1 of the torque constant, or of the inductance."""
+    saturation = registry()["saturation"]
+    values = [0.1 if p.name == law else 0.0 for p in saturation.parameters]
+    emf, L = saturation.laws["emf_factor"](-1.0, 0.0, *values), saturation.laws["inductance_factor"](-1.0, *values)
+    assert (emf, L) == pytest.approx((1.0 / 1.1, 1.0) if law == "per_ampere" else (1.0, 1.0 / 1.1))
+
+
+def test_in_dead_time_a_leg_lies_between_the_rails_where_the_current_is_small():
+    def leg(i, below):
+        return leg_voltage(1.0, i, 48.0, 0.0, 1.0, below)
+
+    i = np.linspace(-1.0, 1.0, 41)
+    soft = np.array([leg(x, 0.5) for x in i])
+    assert soft == pytest.approx(-24.0 * np.clip(i / 0.5, -1.0, 1.0))
+    assert [leg(x, 0.0) for x in (-0.01, 0.01)] == [24.0, -24.0]
+
+
+def test_dead_time_costs_less_where_its_switches_have_capacitance(nominal):
+    hard, soft = (runs(effects={"dead_time": {"time": 3e-6, "below": x}}) for x in (0.0, 1.0))
+    off = [rms((r.envelope - nominal.envelope).mean(axis=0)) for r in (hard, soft)]
+    assert 0.0 < off[1] < 0.9 * off[0]

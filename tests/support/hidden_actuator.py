@@ -63,9 +63,11 @@ class Flaws(NamedTuple):
     flux: float = 0.0  # relative change
     resistance: float = 0.0  # relative change
     dead_time: float = 0.0  # [s]
+    soft_current: float = 0.0  # [A] in dead time a leg lies between as tanh(i/i_0): the switches have capacitances
     reaction: float = 0.0  # [s] comparators see currents and references of that long ago
     source_resistance: float = 0.0  # [ohm], DC link of 2 mF instead of a first-order lag
     saturation_current: float = 0.0  # [A] κ and L fall as tanh(i/i_s)/(i/i_s); 0: never
+    first_ampere: float = 0.0  # [A] κ and L fall as 1/(1 + |i|/i_s); 0: never
     corner: float = 2000.0  # [Hz] of the recorder's two anti-alias stages
     commutation: float = 0.0  # [rad electrical]
     commutation_apart: float = 0.0  # [rad electrical] the part of it that the recorded rotor angle does not have
@@ -101,6 +103,7 @@ class Flaws(NamedTuple):
     once_sine: float = 0.0
     twice_cosine: float = 0.0
     twice_sine: float = 0.0
+    tachometer: float = 0.0  # 1: the speed has a sensor of its own, without the resolver's error
     position_delay: float = 0.0  # [s]
     speed_delay: float = 0.0  # [s]
     clock_skew: float = 0.0  # the recorder's interval is longer by this share
@@ -221,7 +224,7 @@ def _run(q, f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, 
             + f.twice_sine * math.sin(2.0 * theta)
             + (f.commutation - f.commutation_apart) / p
         )
-        seen_w = w + ((error - last_error) / T if tick > 0 else 0.0)
+        seen_w = w + ((1.0 - f.tachometer) * (error - last_error) / T if tick > 0 else 0.0)
         last_error = error
         log_u[tick] = lsb * math.floor((theta_u + lvdt_noise[tick]) / lsb + 0.5)
         log_w[tick] = seen_w
@@ -274,6 +277,10 @@ def _run(q, f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, 
                     loss = _loss(i[j] / f.saturation_current)
                     kappa[j] *= loss
                     Lj[j] *= loss
+                if f.first_ampere > 0.0:
+                    loss = 1.0 / (1.0 + abs(i[j]) / f.first_ampere)
+                    kappa[j] *= loss
+                    Lj[j] *= loss
                 x[j] = gains[j] * i[j] + offsets[j]
                 if j == 0 and f.hum != 0.0:
                     x[j] += f.hum * math.sin(2.0 * math.pi * f.hum_frequency * now)
@@ -299,6 +306,8 @@ def _run(q, f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, 
                 dead = min(blank[j], dt) / dt
                 blank[j] = max(blank[j] - dt, 0.0)
                 diode = -1.0 if i[j] > 0.0 else 1.0
+                if f.soft_current > 0.0:
+                    diode = -math.tanh(i[j] / f.soft_current)
                 v[j] = 0.5 * link[0] * ((1.0 - dead) * sw[j] + dead * diode)
             e0 = v[0] - Rj[0] * i[0] - kappa[0] * w
             e1 = v[1] - Rj[1] * i[1] - kappa[1] * w

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ema.discrepancy.actuator.finding.weighing import is_alike, is_credible, is_enough
+from ema.discrepancy.actuator.finding.weighing import is_alike, is_credible, is_enough, is_something
 from ema.discrepancy.actuator.fitting.candidates import Candidate
 from ema.discrepancy.actuator.fitting.fit import Fit
 from ema.discrepancy.actuator.fitting.free import K_FREE, free
@@ -77,3 +77,11 @@ def test_models_that_leave_as_much_are_alike():
     best = model(FLUX, heldout=1.01)
     assert is_alike(model(DRAG, heldout=1.02), best)
     assert not is_alike(model(DRAG, heldout=3.0), best)
+
+
+@pytest.mark.parametrize(("time", "is_one"), [(2e-6, False), (4e-6, True), (3e-4, True)])
+def test_a_delay_by_which_simulations_of_one_law_differ_is_none(time, is_one):
+    """Two simulators that sample and decide in another order within a step were told apart by 2 µs, at nine sigma."""
+    late = candidate("controller_delay.time")
+    assert is_credible(model(late, controller_delay__time=time)) == is_one
+    assert is_something(model(late, controller_delay__time=time), late) == is_one

@@ -8,7 +8,6 @@ import numpy as np
 
 from ema.discrepancy.actuator.fitting.model import CHANCE, DISTANT, Model
 from ema.effects import registry
-from ema.effects.base import ABSENT
 
 if TYPE_CHECKING:
     from ema.discrepancy.actuator.fitting.candidates import Candidate
@@ -19,6 +18,7 @@ WORTH_IT = 0.25  # share of what is left that a further effect must take on held
 ENOUGH = 0.05  # share of what faults alone leave, from which effects explain it but for the form of their laws
 OWN_SHARE = 0.5  # of a gain that must go when the effect alone is switched off
 ALIKE = 0.6  # share by which two models may leave more or less and be alike: laws are approximations
+NOTHING = 3.0  # deviations that simulations of one law have from each other, within which an effect is none
 DOUBTFUL = 2.0  # deviations from nothing, below which an effect is not named
 SLACK = 0.1  # misfit that switching noise may make
 
@@ -49,13 +49,24 @@ def within_reach(best: Model) -> float:
     return best.fit.misfit + ALIKE * max(best.fit.misfit - 1.0, 0.0) + SLACK
 
 
+def is_something(model: Model, effect: Candidate) -> bool:
+    """Whether an effect is larger than that by which honest simulations of one law differ."""
+    law = registry()[effect.effect]
+    neutral = law.neutral()
+    away = {name: abs(model.fit.point[f"{law.name}.{name}"] - neutral[name]) for name in effect.linear}
+    return any(x >= NOTHING * law.least_sd.get(name, 0.0) for name, x in away.items())
+
+
 def is_credible(model: Model) -> bool:
-    """Whether no parameter of the last effect is driven to what is physically credible at most."""
+    """Whether the last effect is something, with no parameter driven to what is physically credible at most."""
+    if not is_something(model, model.effects[-1]):
+        return False
     effect = model.names[-1]
     for p in registry()[effect].parameters:
         x = model.fit.point.get(f"{effect}.{p.name}")
         margin = 1e-3 * (p.high - p.low)
-        if x is not None and any(abs(x - end) < margin and end not in (p.neutral, ABSENT) for end in (p.low, p.high)):
+        ends = {p.low, p.high} - {p.neutral, *p.laws_at}
+        if x is not None and any(abs(x - end) < margin for end in ends):
             return False
     return True
 

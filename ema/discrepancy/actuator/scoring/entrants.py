@@ -9,7 +9,7 @@ import numpy as np
 
 from ema.core.names import FAULTS
 from ema.core.records import Array
-from ema.discrepancy.actuator.finding.weighing import within_reach
+from ema.discrepancy.actuator.finding.weighing import is_something, within_reach
 from ema.discrepancy.actuator.fitting.fit import columns
 from ema.discrepancy.actuator.fitting.free import K_FREE, Free, goes_with_temperature
 from ema.discrepancy.actuator.fitting.model import Model, ways_of
@@ -135,20 +135,25 @@ def _choose_standing(search: Search, first: list[Model]) -> list[Model]:
     """The `first` models, and those of other sets of effects, those that leave least first.
 
     Of each set, in each way that its effects may act, the last of the first and its best models: where they ended
-    apart, all of them count.
+    apart, all of them count. None but faults alone and the answer has an effect so small that it is none.
     """
+    first = [m for k, m in enumerate(first) if k < 2 or _holds_nothing_small(m)]
     sets: dict[frozenset[str], list[Model]] = {frozenset(m.names): [] for m in first}
     for m in reversed(first):
         of = sets[frozenset(m.names)]
         if ways_of(m) not in map(ways_of, of):
             of.append(m)
     most = len(sets) + OTHERS
-    for m in sorted(search.tried, key=lambda m: m.heldout):
+    for m in sorted(filter(_holds_nothing_small, search.tried), key=lambda m: m.heldout):
         of = sets.setdefault(frozenset(m.names), []) if len(sets) < most else sets.get(frozenset(m.names), [])
         n = sum(ways_of(m) == ways_of(other) for other in of)
         if n < EXPANSIONS and all(m.fit.point != other.fit.point for other in of):
             of.append(m)
     return [m for of in sets.values() for m in of]
+
+
+def _holds_nothing_small(model: Model) -> bool:
+    return all(is_something(model, effect) for effect in model.effects)
 
 
 def _entrant(search: Search, model: Model) -> Entrant:
