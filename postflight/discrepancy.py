@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 # Which module examines which kind of plant.
 EXAMINERS = {"ema": "ema.discrepancy.actuator.examine", "axis": "ema.discrepancy.axis.examine"}
 N_LEADING = 3  # sets that are told
+LEAVING = ("unexplained", "partly explained")  # verdicts where each set leaves more than noise
 
 
 @click.command(short_help="What the simulation gets wrong: name the cause, extend the model, measure the gain.")
@@ -152,7 +153,8 @@ def list_leading(findings: Findings) -> list[str]:
         of[name] = of.get(name, 0.0) + s["probability"]
     leading = sorted(of.items(), key=lambda item: -item[1])[:N_LEADING]
     told = [f"{name} {probability:.2f}" for name, probability in leading]
-    return [f"Probabilities of the sets fitted: {', '.join(told)}."] if told else []
+    which = ", if one of them is right: each leaves more than noise" if findings.verdict in LEAVING else ""
+    return [f"Probabilities of the sets fitted{which}: {', '.join(told)}."] if told else []
 
 
 def _read(paths: Sequence[Path], plan: Sidecar | None = None) -> tuple[list[Record], list[str]]:

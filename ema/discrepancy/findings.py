@@ -224,7 +224,7 @@ class Findings:
             return [_led(self.leading)]
         if self.verdict == "adequate":
             if not self.rest:
-                return ["The simulation agrees with the measurement: what is left is noise."]
+                return ["The simulation agrees with the measurement: what is left is noise.", *self._not_ruled_out()]
             left = f"What is left is small, {self.rest:.3g} times the noise, but it is not noise"
             if self.rest <= 1.0:
                 left = "What is left is no larger than noise, but has a structure that noise has not"
@@ -251,6 +251,12 @@ class Findings:
             said.append(f"No effect of the library explains the rest; its structure: {describe(self.structure, none)}.")
         return said
 
+    def _not_ruled_out(self) -> list[str]:
+        """What may be there and is not needed, in a sentence, where anything is."""
+        may = [s for s in self.posterior if s["effects"] and s["probability"] > NOT_RULED_OUT]
+        told = ", ".join(f"{' + '.join(s['effects'])} ({s['probability']:.2f})" for s in may)
+        return [f"Not needed for it, but not ruled out by these records: {told}."] if told else []
+
 
 def reject(
     name: str,
@@ -267,6 +273,7 @@ def reject(
 
 SURE = 0.9
 WITHIN = 1.96  # deviations from the value to either end of an interval of 95 %
+NOT_RULED_OUT = 0.1  # probability from which what is not needed is worth a word
 SEEN = 1.05  # times the noise, where a rest beside a cause is worth a word
 
 

@@ -128,7 +128,7 @@ class Effect:
         Where a search looks for it on an axis, if it need not be seen in the balance of torque first.
     acts_at_rest : bool
         Whether it says what friction does before it slides, so that a simulation with it knows an axis that creeps.
-    derived : mapping of str to function values → number
+    derived : mapping of str to function values → number or word
         What the sentence tells besides the parameters.
     product : pair of str, optional
         Parameters whose product a record tells far better than either.
@@ -148,7 +148,7 @@ class Effect:
     looks: tuple[Look, ...] = ()
     on_axis: OnAxis | None = None
     acts_at_rest: bool = False
-    derived: Mapping[str, Callable[[Mapping[str, float]], float]] = field(default_factory=dict)
+    derived: Mapping[str, Callable[[Mapping[str, float]], float | str]] = field(default_factory=dict)
     product: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:

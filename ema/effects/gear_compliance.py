@@ -14,12 +14,13 @@ EFFECT = Effect(
         Parameter("friction", "N m", 0.0, 0.0, 100.0, 1.0, "dry friction at the user"),
     ),
     sentence=(
-        "the gear train gives {compliance:.2g} rad per N m; with {inertia:.2g} kg m² at the user it resonates, "
-        "or creeps where its damping ratio, {damping:.2g}, is above 1"
+        "the gear train gives {compliance:.2g} rad per N m; with {inertia:.2g} kg m² at the user it {manner} "
+        "(damping ratio {damping:.2g})"
     ),
     separated_by="fast motion with the angles of motor and load both measured",
     mistaken_for=("k2",),
     plants=("ema", "axis"),
+    derived={"manner": lambda v: "resonates" if v["damping"] < 1.0 else "creeps after the motor"},
     product=("inertia", "compliance"),
     limits={"inertia": POSITIVE, **dict.fromkeys(("compliance", "damping", "drag", "friction"), NOT_NEGATIVE)},
 )

@@ -157,3 +157,16 @@ def test_rigid_body_terms_that_the_balance_has_are_never_nothing_that_stands_out
     gain = Gain(0.1, 0.1, 0.1, 0.1, 0.01)
     (said,) = Findings("unexplained", [], gain, balance={"terms": [], "given": [{"name": "linked_axis"}]}).sentences()
     assert "what the balance shows" in said
+
+
+def test_what_is_not_needed_and_not_ruled_out_is_told():
+    sets = [{"effects": names, "probability": p} for names, p in (([], 0.55), (["winding_resistance"], 0.4))]
+    agrees, may = Findings("adequate", [], GAIN, posterior=sets).sentences()
+    assert "agrees" in agrees
+    assert "winding_resistance (0.40)" in may
+    assert len(Findings("adequate", [], GAIN, posterior=[{"effects": [], "probability": 0.97}]).sentences()) == 1
+
+
+@pytest.mark.parametrize(("damping", "said"), [(0.06, "resonates (damping ratio 0.06)"), (1.4, "creeps after the")])
+def test_a_gear_is_told_by_what_it_does(damping, said):
+    assert said in registry()["gear_compliance"].said({"compliance": 4e-6, "damping": damping})

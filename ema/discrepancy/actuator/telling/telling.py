@@ -179,12 +179,14 @@ def try_as_function(search: Search, findings: Findings, before: Model, after: Mo
         m = search.model((), base.fit.free, {**base.fit.point, **table}, None, 4)
         if base.excess - m.excess < WORTH_IT * base.excess:
             continue
+        error, _ = over_folds(search, before, m)
+        if error.gain <= 0.0:
+            continue  # less is left of the rest, and more of the currents
         e = registry()[effect]
         quantities = {p.name: Quantity(values[p.name], values[p.name], values[p.name], p.unit) for p in e.parameters}
         unnamed = [FoundEffect(effect, 0.0, (), quantities, e.said(values), e.separated_by, e.place)]
         share = 1.0 - m.excess / base.excess
         findings.structure["sentences"].append(f"{e.said(values)}, takes {share:.0%} of the rest")
-        error, _ = over_folds(search, before, m)
         k_after = tuple(round(m.fit.point.get(n, 0.0), 5) for n in FAULTS)
         after_it = replace(
             findings.gain,
