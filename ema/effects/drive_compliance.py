@@ -15,10 +15,11 @@ EFFECT = Effect(
     ),
     sentence=(
         "the gear train before the measured angle gives {compliance:.2g} rad per N m; "
-        "with the motor's {inertia:.2g} kg m² it resonates, "
-        "or creeps where its damping ratio, {damping:.2g}, is above 1"
+        "with the motor's {inertia:.2g} kg m² it {manner} "
+        "(damping ratio {damping:.2g})"
     ),
     separated_by="fast motion with the angles of motor and load both measured",
     plants=("axis",),
+    derived={"manner": lambda v: "resonates" if v["damping"] < 1.0 else "creeps after the motor"},
     limits={"inertia": POSITIVE, **dict.fromkeys(("compliance", "damping", "drag", "friction"), NOT_NEGATIVE)},
 )

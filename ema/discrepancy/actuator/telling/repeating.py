@@ -41,6 +41,5 @@ def describe(share: float | None) -> list[str]:
     """One sentence, where most of the rest does not repeat."""
     if share is None or share > SELDOM:
         return []
-    return [
-        f"{1.0 - max(share, 0.0):.0%} of it differs from cycle to cycle of one motion: it comes and goes, or keeps no phase"
-    ]
+    other = f"{1.0 - max(share, 0.0):.0%}"
+    return [f"{other} of it differs from cycle to cycle of one motion: it comes and goes, or keeps no phase"]
