@@ -77,7 +77,7 @@ def discrepancy(
         require_new(path)
     make_folder(out)
     complaints = [line for record in read for line in record.complaints]
-    notes = [*_left_out(read, cycles), *empty, *complaints]
+    notes = [*_left_out(read, cycles), *empty, *complaints, *_repeated(read)]
     findings = _examined(EXAMINERS[kind], plant_file, read, records, files, notes)
     if as_json:
         click.echo(files[0].read_text(encoding="utf-8"), nl=False)
@@ -143,6 +143,14 @@ def _examined(
         say("pictures")
         write_report(report, name, records, findings, draw())
     return findings
+
+
+def _repeated(records: Sequence[Record]) -> list[str]:
+    """Of records with rows that were lost and repeated: what is left may be these."""
+    from ema.discrepancy.records.allowed import say_repeated
+    from ema.discrepancy.records.facts import count_repeated
+
+    return [f"{record.name}: {say_repeated(n)}" for record in records if (n := count_repeated(record))]
 
 
 def list_leading(findings: Findings) -> list[str]:

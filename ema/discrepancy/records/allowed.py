@@ -60,6 +60,11 @@ def list_allowed(record: Record, clock: Sampling, facts: list[ChannelFacts], agr
     return Allowed(plants, missing, [*_clock(clock), *_channels(facts), *disagreeing])
 
 
+def say_repeated(n: int) -> str:
+    """What is said of rows that repeat the one before."""
+    return f"{n} rows repeat the one before in every measured channel: samples were lost, and the last was taken again"
+
+
 def _said(name: str) -> str:
     return f"{name} [{CHANNELS[name].unit}]"
 
@@ -68,6 +73,8 @@ def _clock(clock: Sampling) -> list[str]:
     said = []
     if clock.n_gaps:
         said.append(f"{clock.n_gaps} gaps, the longest {clock.longest:.3g} s at a period of {clock.period:.3g} s")
+    if clock.n_repeated:
+        said.append(say_repeated(clock.n_repeated))
     if clock.jitter > JITTERY:
         said.append(f"time steps vary by {100 * clock.jitter:.0f} % of the period; they are taken as they are stamped")
     if clock.n_samples < FEW:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from ema.core.names import CHANNELS
 from ema.core.records import Array, Record
@@ -19,6 +20,7 @@ PARABOLA = 2.0 / (np.sqrt(2.0) - 1.0)
 POSITIONS = ("theta_m", "q", "theta_u", "theta_n")  # come to rest where they turn round, held by friction
 COMMANDS = ("theta_ref", "q_ref", "theta_cmd", "w_ref")  # may dwell where they like
 ENDS = 0.002  # share of a channel's samples at its end from which that is a limit, not a peak
+BY_CHANCE = 1e-6  # probability of as many repeated rows in a record that lost none
 HIGH = (0.6, 0.95)  # upper part of the spectrum, of half the sampling rate
 FALLEN = 0.02  # power in that part, of all but the mean, below which a channel has fallen off [1]
 
@@ -41,6 +43,8 @@ class Sampling:
         Steps longer than LONG medians.
     longest : float
         The longest step. [s]
+    n_repeated : int
+        Rows that repeat the one before in every measured channel, if more than chance makes: samples that were lost.
     """
 
     n_cycles: int
@@ -50,6 +54,7 @@ class Sampling:
     jitter: float
     n_gaps: int
     longest: float
+    n_repeated: int
 
 
 @dataclass(frozen=True)
@@ -96,7 +101,33 @@ def sampling(record: Record) -> Sampling:
         float(np.std(regular) / period) if regular.size else np.nan,
         int(np.sum(steps > LONG * period)),
         float(steps.max()) if steps.size else np.nan,
+        count_repeated(record),
     )
+
+
+def count_repeated(record: Record) -> int:
+    """Rows that repeat the one before in every measured channel, 0 where as many do by chance.
+
+    Looked at is the channel that stays least often as it was, where it moves before and after: as often as the others
+    stay at any time, they stay there by chance.
+    """
+    names = [name for name in record.channels if name not in ("t", *COMMANDS)]
+    stays = [np.array([np.diff(cycle[name]) == 0.0 for name in names]) for cycle in record.cycles]
+    share = [float(np.mean(np.concatenate([of[j] for of in stays]))) for j in range(len(names))]
+    moving = [j for j, of in enumerate(share) if of < 1.0]
+    if len(moving) <= 1:  # there is nothing for it to be lost with
+        return 0
+    least, *others = sorted(moving, key=lambda j: share[j])
+    n, alone, together, free = 0, 0, 0, 0
+    for of in stays:
+        own, rest = of[least], np.asarray(np.all(of[others], axis=0))
+        once = own[1:-1] & ~own[:-2] & ~own[2:]
+        n += int((once & rest[1:-1]).sum())
+        alone += int(once.sum())
+        together += int((rest & ~own).sum())
+        free += int((~own).sum())
+    by_chance = alone * together / max(free, 1)
+    return n if stats.poisson.sf(n - 1, by_chance) < BY_CHANCE else 0
 
 
 def channels(record: Record) -> list[ChannelFacts]:
