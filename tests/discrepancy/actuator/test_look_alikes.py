@@ -44,6 +44,26 @@ def test_a_load_is_asked_where_a_spring_does_the_same_around_one_place(hidden):
     assert {s.candidate.effect for s in alike} == {"constant_load", "asymmetric_friction"}
 
 
+@pytest.mark.slow
+def test_it_is_asked_beside_what_acts_too_and_not_at_the_nominal_point(hidden):
+    """Beside grease that doubles the currents a load at the nominal point was like nothing: a spring was sure, 0.99."""
+    trial = strata.drawn("two effects", 1, 4083970632)
+    k = {name: x for name, x in zip(FAULTS, trial.k, strict=True) if x}
+    made = hidden.cycles(hidden.Flaws(**trial.values, **k), 4, 70632, trial.motions, trial.bench)
+    data = prepare(trial.actuator, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))])
+    plant = EmaPlant(trial.actuator, data, 2)
+    of = {c.effect: c for c in candidates(trial.actuator, data, [])}
+    drag, spring = of["viscous_drag"], of["spring_load"]
+    frees = (*K_FREE, *drag.frees)
+    true = {**k, "viscous_drag.coefficient": trial.values["viscous"]}
+    search = Search(plant, Noise(plant, true), *split(data))
+    before = search.model((drag,), frees, true, None, 2)
+    best = search.model((drag, spring), (*frees, *spring.frees), before.fit.point, None, 6)
+    assert best.excess < 0.2
+    alike = find_look_alikes(search, before, best, rank_to_first_order(search, before), set(), only_there=True)
+    assert {s.candidate.effect for s in alike} >= {"constant_load", "asymmetric_friction"}
+
+
 @pytest.fixture(scope="module")
 def everything(shipped_plant, hidden):
     """Each effect as a candidate, by name."""

@@ -201,20 +201,27 @@ def find_look_alikes(
 
     What probes do where nothing else acts may mislead: what resembles the effect there begins where `best` is without
     it, with what by first order does the same there, and what this leaves is simulated. So is what was fitted already,
-    if the effect has taken the place of faults: from these no fit gets there. With `only_there` all are asked there.
+    if the effect has taken the place of faults: from these no fit gets there. With `only_there` all are asked there:
+    beside a drag that doubles the currents a constant load at the nominal point is no more like what it does there than
+    anything else.
     """
     effect = best.effects[-1]
     done = _what_is_done(search, best, [effect])
     replaced = effect.faults if model.shows_faults_of(effect) else []
+    new = [s for s in screened if s.candidate.effect != effect.effect]
+    new = [s for s in new if replaced or s.candidate.way not in fitted]
+    at, rest = (best, strip(best, effect)[2]) if only_there else (model, {})
     free = tuple(f for f in model.fit.free if f.name not in replaced)
-    own = stacked_jacobian(search.noise, free, model.fit.columns, search.train)
+    own = stacked_jacobian(search.noise, free, at.fit.columns, search.train)
+    probed = [s.candidate for s in new]
+    columns = _columns_at(search, rest, probed) if only_there else [columns_of(search, c) for c in probed]
     found: dict[Way, Screened] = {}
     asked: list[tuple[Screened, Array]] = []
-    for s in screened:
+    for s, J in zip(new, columns, strict=True):
         c = s.candidate
-        if c.way in found or c.effect == effect.effect or (c.way in fitted and not replaced):
+        if c.way in found:
             continue
-        amounts, share = _do_most(done, columns_of(search, c), own)
+        amounts, share = _do_most(done, J, own)
         if share > COLLINEAR and c.way not in fitted and not only_there:
             found[c.way] = s
         elif share > RESEMBLING:
@@ -264,7 +271,8 @@ def _start_instead(
     for s, values in asked:
         c = s.candidate
         low, high = (np.concatenate(ends) for ends in zip(limits, c.limits(), strict=True))
-        there = np.concatenate([own, _columns_at(search, rest, c.sized(values))], axis=1)
+        (J,) = _columns_at(search, rest, [c.sized(values)])
+        there = np.concatenate([own, J], axis=1)
         step, _ = solve_within_bounds(there, done, low, high)
         begun.append(s._replace(start={**step_to(rest, others, step[: len(others)]), **c.start(step[len(others) :])}))
     return begun
@@ -287,18 +295,24 @@ def _keep_alike(search: Search, best: Model, done: Array, begun: Sequence[Screen
     return [s for misfit, s in nearest if misfit - here < more]
 
 
-def _columns_at(search: Search, point: Point, c: Candidate) -> Array:
-    """Whitened columns (per unit) of a candidate beside all that a point has."""
+def _columns_at(search: Search, point: Point, found: Sequence[Candidate]) -> list[Array]:
+    """Whitened columns (per unit) of candidates beside all that a point has."""
+    if not found:
+        return []
     first = search.plant.first
-    points = [point, *({**point, **probe} for probe in c.probes())]
+    points = [point, *({**point, **probe} for c in found for probe in c.probes())]
     here, *there = search.plant.means(points, first, N_PROBE, SEED, (DT_PROBE,))
-    names = [Free(c.probe_name(j), 0.0, 0.0, 1.0) for j in range(len(c.amounts))]
-    cols = {
-        (motion, f.name): (at[cycle] - here[cycle]) / amount
-        for f, amount, at in zip(names, c.amounts, there, strict=True)
-        for motion, cycle in enumerate(first)
-    }
-    return stacked_jacobian(search.noise, names, cols, search.train)
+    means, out = iter(there), []
+    for c in found:
+        names = [Free(c.probe_name(j), 0.0, 0.0, 1.0) for j in range(len(c.amounts))]
+        probes = [next(means) for _ in names]
+        cols = {
+            (motion, f.name): (at[cycle] - here[cycle]) / amount
+            for f, amount, at in zip(names, c.amounts, probes, strict=True)
+            for motion, cycle in enumerate(first)
+        }
+        out.append(stacked_jacobian(search.noise, names, cols, search.train))
+    return out
 
 
 def _do_most(done: Array, columns: Array, own: Array) -> tuple[Array, float]:
