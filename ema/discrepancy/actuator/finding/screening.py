@@ -210,11 +210,12 @@ def find_look_alikes(
     replaced = effect.faults if model.shows_faults_of(effect) else []
     new = [s for s in screened if s.candidate.effect != effect.effect]
     new = [s for s in new if replaced or s.candidate.way not in fitted]
-    at, rest = (best, strip(best, effect)[2]) if only_there else (model, {})
+    is_there = only_there and not replaced  # in the place of faults it is what it was taken for at the nominal point
+    at, rest = (best, strip(best, effect)[2]) if is_there else (model, {})
     free = tuple(f for f in model.fit.free if f.name not in replaced)
     own = stacked_jacobian(search.noise, free, at.fit.columns, search.train)
     probed = [s.candidate for s in new]
-    columns = _columns_at(search, rest, probed) if only_there else [columns_of(search, c) for c in probed]
+    columns = _columns_at(search, rest, probed) if is_there else [columns_of(search, c) for c in probed]
     found: dict[Way, Screened] = {}
     asked: list[tuple[Screened, Array]] = []
     for s, J in zip(new, columns, strict=True):
