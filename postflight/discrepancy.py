@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 # Which module examines which kind of plant.
 EXAMINERS = {"ema": "ema.discrepancy.actuator.examine", "axis": "ema.discrepancy.axis.examine"}
 N_LEADING = 3  # sets that are told
-LEAVING = ("unexplained", "partly explained")  # verdicts where each set leaves more than noise
 
 
 @click.command(short_help="What the simulation gets wrong: name the cause, extend the model, measure the gain.")
@@ -155,13 +154,15 @@ def _repeated(records: Sequence[Record]) -> list[str]:
 
 def list_leading(findings: Findings) -> list[str]:
     """The likeliest sets in one line."""
+    from ema.discrepancy.grade import UNSOLVED
+
     of: dict[str, float] = {}  # of sets of the same names, as two lines of other orders, together
     for s in findings.posterior:
         name = " + ".join(s["effects"]) or findings.gain.no_cause
         of[name] = of.get(name, 0.0) + s["probability"]
     leading = sorted(of.items(), key=lambda item: -item[1])[:N_LEADING]
     told = [f"{name} {probability:.2f}" for name, probability in leading]
-    which = ", if one of them is right: each leaves more than noise" if findings.verdict in LEAVING else ""
+    which = ", if one of them is right: each leaves more than noise" if findings.verdict in UNSOLVED else ""
     return [f"Probabilities of the sets fitted{which}: {', '.join(told)}."] if told else []
 
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from .folds import Folds
 
 Verdict = Literal["adequate", "explained", "partly explained", "unexplained", "unfinished"]
+UNSOLVED: tuple[Verdict, ...] = ("partly explained", "unexplained")  # more is left than noise may make
 UPPER = 1.645  # deviations, that an estimate exceeds with a probability of 5 %
 IN_SET = 0.05  # share of what is sure of a set, below which a member is none: the others are a set of 95 %
 NAMED = 0.5  # probability of an effect with all that the data cannot tell from it, from which it is named

@@ -16,6 +16,7 @@ from ema.core import pages
 from ema.core.version import version
 
 from .findings import Findings
+from .grade import UNSOLVED
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,6 +57,7 @@ def write_report(
         g=findings.gain,
         sentences=findings.sentences(),
         alike=_alike(findings),
+        is_unsolved=findings.verdict in UNSOLVED,
         pictures=pictures,
         software=version(),
         css=pages.style(),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .base import NOT_NEGATIVE, POSITIVE, Effect, Parameter
+from .gear_compliance import manner
 
 EFFECT = Effect(
     name="drive_compliance",
@@ -20,6 +21,6 @@ EFFECT = Effect(
     ),
     separated_by="fast motion with the angles of motor and load both measured",
     plants=("axis",),
-    derived={"manner": lambda v: "resonates" if v["damping"] < 1.0 else "creeps after the motor"},
+    derived={"manner": manner},
     limits={"inertia": POSITIVE, **dict.fromkeys(("compliance", "damping", "drag", "friction"), NOT_NEGATIVE)},
 )

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from . import per_turn
 from .base import SHARE, Effect
 
 MOST = 0.95  # of dry friction, in one part
-_wave = njit(inline="always")(per_turn.wave)
 
 
 def factor(
     theta_m, w_m, theta_u, direction, tau_load, once_cosine, once_sine, twice_cosine, twice_sine
 ):  # fmt: skip
     """F × [1 + c₁ cos θ_m + s₁ sin θ_m + c₂ cos 2θ_m + s₂ sin 2θ_m]"""
-    return 1.0 + _wave(theta_m, once_cosine, once_sine, twice_cosine, twice_sine)
+    return 1.0 + per_turn.inlined_wave(theta_m, once_cosine, once_sine, twice_cosine, twice_sine)
 
 
 EFFECT = Effect(

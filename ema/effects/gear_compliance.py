@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from .base import NOT_NEGATIVE, POSITIVE, Effect, Parameter
+
+
+def manner(values: Mapping[str, float]) -> str:
+    """What hangs to a spring does."""
+    return "resonates" if values["damping"] < 1.0 else "creeps after the motor"
+
 
 EFFECT = Effect(
     name="gear_compliance",
@@ -20,7 +28,7 @@ EFFECT = Effect(
     separated_by="fast motion with the angles of motor and load both measured",
     mistaken_for=("k2",),
     plants=("ema", "axis"),
-    derived={"manner": lambda v: "resonates" if v["damping"] < 1.0 else "creeps after the motor"},
+    derived={"manner": manner},
     product=("inertia", "compliance"),
     limits={"inertia": POSITIVE, **dict.fromkeys(("compliance", "damping", "drag", "friction"), NOT_NEGATIVE)},
 )

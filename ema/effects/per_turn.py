@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from math import pi
 
+from numba import njit
+
 from .base import Parameter
 from .search import AxisSizes, Span
 from .vector_math import cos, sin
@@ -18,6 +20,9 @@ def wave(theta_m, once_cosine, once_sine, twice_cosine, twice_sine):
     """c₁ cos θ + s₁ sin θ + c₂ cos 2θ + s₂ sin 2θ"""
     c, s = cos(theta_m), sin(theta_m)
     return once_cosine * c + once_sine * s + twice_cosine * (c * c - s * s) + twice_sine * (2.0 * s * c)
+
+
+inlined_wave = njit(inline="always")(wave)  # within a law
 
 
 def slope(theta_m, once_cosine, once_sine, twice_cosine, twice_sine):

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from numba import njit
-
 from . import per_turn
 from .base import Effect, Parameter
 from .search import AxisSizes, Look, Span
-
-_wave = njit(inline="always")(per_turn.wave)
 
 
 def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
@@ -20,7 +16,7 @@ def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
 
 def angle_error(theta_m, once_cosine, once_sine, twice_cosine, twice_sine, in_speed):
     """`per_turn.wave`"""
-    return _wave(theta_m, once_cosine, once_sine, twice_cosine, twice_sine)
+    return per_turn.inlined_wave(theta_m, once_cosine, once_sine, twice_cosine, twice_sine)
 
 
 EFFECT = Effect(

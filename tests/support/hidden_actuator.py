@@ -273,14 +273,13 @@ def _run(q, f, command, lvdt_noise, substeps, t0, rng_switch, i, flt, sw, mech, 
                 kappa[j] = k_e * (1.0 + f.flux) * N[j] * (1.0 + f.k6 * math.cos(theta + f.phi - shift[j]))
                 kappa[j] *= _trapezoid(p * theta - shift[j])
                 Lj[j], Rj[j] = L * N[j] * N[j], R * N[j] * (1.0 + f.resistance)
+                loss = 1.0
                 if f.saturation_current > 0.0:
                     loss = _loss(i[j] / f.saturation_current)
-                    kappa[j] *= loss
-                    Lj[j] *= loss
                 if f.first_ampere > 0.0:
-                    loss = 1.0 / (1.0 + abs(i[j]) / f.first_ampere)
-                    kappa[j] *= loss
-                    Lj[j] *= loss
+                    loss /= 1.0 + abs(i[j]) / f.first_ampere
+                kappa[j] *= loss
+                Lj[j] *= loss
                 x[j] = gains[j] * i[j] + offsets[j]
                 if j == 0 and f.hum != 0.0:
                     x[j] += f.hum * math.sin(2.0 * math.pi * f.hum_frequency * now)

@@ -20,20 +20,24 @@ from ema.discrepancy.actuator.simulating.noise import Noise
 from ema.discrepancy.actuator.simulating.plant import EmaPlant
 
 
+def recorded(hidden, trial, n_cycles, seed):
+    """A trial's record as the search has it, the faults that are in it, and each effect as a candidate."""
+    k = {name: x for name, x in zip(FAULTS, trial.k, strict=True) if x}
+    made = hidden.cycles(hidden.Flaws(**trial.values, **k), n_cycles, seed, trial.motions, trial.bench)
+    data = prepare(trial.actuator, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))])
+    return EmaPlant(trial.actuator, data, 1), k, {c.effect: c for c in candidates(trial.actuator, data, [])}
+
+
 @pytest.mark.further
 @pytest.mark.slow
 def test_a_load_is_asked_where_a_spring_does_the_same_around_one_place(hidden):
     """On a light actuator, where differences of runs are mostly noise: of what is the same, they show nine tenths."""
     trial = strata.drawn("three effects", 2, 2557375145)
-    k = {name: x for name, x in zip(FAULTS, trial.k, strict=True) if x}
-    made = hidden.cycles(hidden.Flaws(**trial.values, **k), 6, 75145, trial.motions, trial.bench)
-    data = prepare(trial.actuator, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))])
-    plant = EmaPlant(trial.actuator, data, 1)
-    of = {c.effect: c for c in candidates(trial.actuator, data, [])}
+    plant, k, of = recorded(hidden, trial, 6, 75145)
     late, inertia, spring = of["comparator_delay"], of["inertia"], of["spring_load"]
     frees = (*K_FREE, *late.frees, *inertia.frees)
     true = {**k, "comparator_delay.time": trial.values["reaction"], "inertia.change": trial.values["inertia"]}
-    search = Search(plant, Noise(plant, true), *split(data))
+    search = Search(plant, Noise(plant, true), *split(plant.data))
     before = search.model((late, inertia), frees, true, None, 2)
     best = search.model((late, inertia, spring), (*frees, *spring.frees), before.fit.point, None, 4)
     assert best.excess < 0.1
@@ -48,15 +52,11 @@ def test_a_load_is_asked_where_a_spring_does_the_same_around_one_place(hidden):
 def test_it_is_asked_beside_what_acts_too_and_not_at_the_nominal_point(hidden):
     """Beside grease that doubles the currents a load at the nominal point was like nothing: a spring was sure, 0.99."""
     trial = strata.drawn("two effects", 1, 4083970632)
-    k = {name: x for name, x in zip(FAULTS, trial.k, strict=True) if x}
-    made = hidden.cycles(hidden.Flaws(**trial.values, **k), 4, 70632, trial.motions, trial.bench)
-    data = prepare(trial.actuator, [Record(tuple(Cycle(n, c) for n, c in enumerate(made)))])
-    plant = EmaPlant(trial.actuator, data, 2)
-    of = {c.effect: c for c in candidates(trial.actuator, data, [])}
+    plant, k, of = recorded(hidden, trial, 4, 70632)
     drag, spring = of["viscous_drag"], of["spring_load"]
     frees = (*K_FREE, *drag.frees)
     true = {**k, "viscous_drag.coefficient": trial.values["viscous"]}
-    search = Search(plant, Noise(plant, true), *split(data))
+    search = Search(plant, Noise(plant, true), *split(plant.data))
     before = search.model((drag,), frees, true, None, 2)
     best = search.model((drag, spring), (*frees, *spring.frees), before.fit.point, None, 6)
     assert best.excess < 0.2

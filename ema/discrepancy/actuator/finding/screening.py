@@ -201,9 +201,9 @@ def find_look_alikes(
 
     What probes do where nothing else acts may mislead: what resembles the effect there begins where `best` is without
     it, with what by first order does the same there, and what this leaves is simulated. So is what was fitted already,
-    if the effect has taken the place of faults: from these no fit gets there. With `only_there` all are asked there:
-    beside a drag that doubles the currents a constant load at the nominal point is no more like what it does there than
-    anything else.
+    if the effect has taken the place of faults: from these no fit gets there. With `only_there` all others are asked
+    there: beside a drag that doubles the currents a constant load at the nominal point is no more like what it does
+    there than anything else.
     """
     effect = best.effects[-1]
     done = _what_is_done(search, best, [effect])
@@ -211,11 +211,13 @@ def find_look_alikes(
     new = [s for s in screened if s.candidate.effect != effect.effect]
     new = [s for s in new if replaced or s.candidate.way not in fitted]
     is_there = only_there and not replaced  # in the place of faults it is what it was taken for at the nominal point
-    at, rest = (best, strip(best, effect)[2]) if is_there else (model, {})
     free = tuple(f for f in model.fit.free if f.name not in replaced)
-    own = stacked_jacobian(search.noise, free, at.fit.columns, search.train)
+    own = stacked_jacobian(search.noise, free, (best if is_there else model).fit.columns, search.train)
     probed = [s.candidate for s in new]
-    columns = _columns_at(search, rest, probed) if is_there else [columns_of(search, c) for c in probed]
+    if is_there:
+        columns = _columns_at(search, strip(best, effect)[2], probed)
+    else:
+        columns = [columns_of(search, c) for c in probed]
     found: dict[Way, Screened] = {}
     asked: list[tuple[Screened, Array]] = []
     for s, J in zip(new, columns, strict=True):

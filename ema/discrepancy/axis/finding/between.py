@@ -17,6 +17,7 @@ import numpy as np
 
 from ema.discrepancy.examine import examine
 from ema.discrepancy.fitting import Fit, fit
+from ema.discrepancy.grade import UNSOLVED
 from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Free, Point
 from ema.discrepancy.progress import Progress
@@ -133,7 +134,7 @@ def _find_doubt(plant: AxisPlant, outcome: Outcome) -> str:
     """Another way that what was found, or not, may come from."""
     if plant.plant.drive == "speed-loop" and outcome.effects:
         return "fast" if plant.between == "straight" else "straight"
-    if plant.between != "straight" and outcome.verdict in ("partly explained", "unexplained"):
+    if plant.between != "straight" and outcome.verdict in UNSOLVED:
         return "straight"  # what looked like a drive that is held may have been something that is missing
     return plant.between
 

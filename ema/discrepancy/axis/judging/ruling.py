@@ -29,7 +29,7 @@ from ema.discrepancy.axis.balance.regressing.regression import regress
 from ema.discrepancy.axis.balance.telling.as_effects import effects, point
 from ema.discrepancy.axis.balance.telling.telling import of_given
 from ema.discrepancy.folds import Folds
-from ema.discrepancy.grade import NAMED, UPPER, Left
+from ema.discrepancy.grade import NAMED, UNSOLVED, UPPER, Left
 from ema.discrepancy.outcome import Outcome
 from ema.effects import registry
 
@@ -83,7 +83,7 @@ def rule_by_balance(plant: AxisPlant, outcome: Outcome) -> Ruling | None:
 def _why_it_rules(plant: AxisPlant, outcome: Outcome, b: Balance, left: Left, missing: Sequence[Term]) -> str:
     """What keeps free runs from being a witness against the balance, in words; empty where nothing does."""
     missed = outcome.folds.err_after
-    unsolved = outcome.verdict in ("partly explained", "unexplained")
+    unsolved = outcome.verdict in UNSOLVED
     is_closer = unsolved and left.residual.rest < outcome.left.residual.rest
     leave_little = outcome.left.residual.rest <= outcome.left.allowed
     if not missing and outcome.structure and outcome.rest <= outcome.left.allowed:

@@ -7,13 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ema.core.records import Array
 from ema.discrepancy.axis.balance.laws.along import ANY, LINES
 from ema.discrepancy.axis.balance.laws.law import BY_RECORD, BY_RECORD_NAME, Law
 from ema.discrepancy.axis.balance.laws.links import LINKS
 
 from .found import Balance, Term
-from .members import N_FINER, draw_members, fit_sizes, members_around
+from .members import N_FINER, draw_members, fit_sizes, gains_of, members_around
 from .needed import ALARM, SIMPLER, Asked, chance, families_held, is_needed, simpler_families
 from .regression import Corrected, Plain, Regression, is_machine, regress
 from .rows import Rows
@@ -126,18 +125,8 @@ def _best(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
 def _best_of(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
     if len(members) == 1:
         return members[0]
-    gains = _gains(found, model, members)
+    gains = gains_of(found, model, members)
     return members[int(np.argmax(gains >= (1.0 - EQUAL) * gains.max()))]
-
-
-def _gains(found: Rows, model: Regression, members: Sequence[Law]) -> Array:
-    """What each member would take of the square that is left, shape (n_members,)."""
-    q, _ = np.linalg.qr(model.design)
-    left = model.left - q @ (q.T @ model.left)
-    A = np.stack([found.of(law, model.acting) for law in members])  # (n_members, n_columns, n_rows)
-    A -= (A @ q) @ q.T
-    gram, b = A @ A.transpose(0, 2, 1), A @ left
-    return np.asarray(np.einsum("mc,mcd,md->m", b, np.linalg.pinv(gram, rcond=1e-6, hermitian=True), b))
 
 
 def _best_members(found: Rows, plain: Plain, model: Regression, every: Sequence[Law]) -> Regression:
@@ -252,7 +241,7 @@ def _near_members(
         near = members_around(found, without, law, same)
     else:
         same += [own for k in range(1, N_FINER + 1) if law.finer is not None for own in law.finer(0.5**k)]
-        near = [same[k] for k in np.argsort(-_gains(found, without, same))[:N_NEAR]] if same else []
+        near = [same[k] for k in np.argsort(-gains_of(found, without, same))[:N_NEAR]] if same else []
     near = [law, *(own for own in near if own.key != law.key)]
     drawn = np.bincount(draw_members(found, without, near, N_DRAWS), minlength=len(near)) / N_DRAWS
     return tuple((regress(found, plain, _add(without, near[k])), float(drawn[k])) for k in np.flatnonzero(drawn) if k)

@@ -21,6 +21,16 @@ N_FINER = 9  # times that the step between members of a family is halved
 N_SHAPES = 6  # the same of a second size: less is seen of it
 
 
+def gains_of(found: Rows, model: Regression, members: Sequence[Law]) -> Array:
+    """What each member would take of the square that is left, shape (n_members,)."""
+    q, _ = np.linalg.qr(model.design)
+    left = model.left - q @ (q.T @ model.left)
+    A = np.stack([found.of(law, model.acting) for law in members])  # (n_members, n_columns, n_rows)
+    A -= (A @ q) @ q.T
+    gram, b = A @ A.transpose(0, 2, 1), A @ left
+    return np.asarray(np.einsum("mc,mcd,md->m", b, np.linalg.pinv(gram, rcond=1e-6, hermitian=True), b))
+
+
 def fit_sizes(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
     """The member of a family that takes most of what a model without it leaves, by Gauss and Newton's steps.
 
@@ -28,9 +38,10 @@ def fit_sizes(found: Rows, model: Regression, members: Sequence[Law]) -> Law:
     member's.
     """
     starts: dict[tuple[float, ...], Law] = {}
-    for law in sorted(members, key=lambda law: _taken(found, model, law)):
-        starts[tuple(_among(law).at[1:])] = law  # the best is the last
-    return max((_descend(found, model, law) for law in starts.values()), key=lambda law: _taken(found, model, law))
+    for k in np.argsort(gains_of(found, model, members), kind="stable"):
+        starts[tuple(_among(members[k]).at[1:])] = members[k]  # the best is the last
+    fitted = [_descend(found, model, law) for law in starts.values()]
+    return fitted[int(np.argmax(gains_of(found, model, fitted)))]
 
 
 def members_around(found: Rows, model: Regression, law: Law, members: Sequence[Law]) -> list[Law]:
@@ -78,23 +89,22 @@ def draw_members(found: Rows, model: Regression, members: Sequence[Law], n_draws
 
 def _descend(found: Rows, model: Regression, law: Law, n_free: int | None = None) -> Law:
     """By Gauss and Newton's steps, of all sizes or the first `n_free`."""
-    taken = _taken(found, model, law)
     for _ in range(N_STEPS):
         among = _among(law)
         (f,) = found.of(law, model.acting)
         A = np.column_stack([model.design, f, _slopes(found, among, model.acting)[:, :n_free]])
-        solved = np.linalg.lstsq(A / np.maximum(np.linalg.norm(A, axis=0), 1e-300), found.y, rcond=LEAST)[0]
-        solved /= np.maximum(np.linalg.norm(A, axis=0), 1e-300)
+        size = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
+        solved = np.linalg.lstsq(A / size, found.y, rcond=LEAST)[0] / size
         c, moves = solved[model.design.shape[1]], np.zeros(len(among.at))
         moves[:n_free] = solved[model.design.shape[1] + 1 :]
         if c == 0.0:
             break
         tried = [among.moved(share * moves / c) for share in SHORTER]
-        gains = [_taken(found, model, own) for own in tried]
+        taken, *gains = gains_of(found, model, [law, *tried])
         best = int(np.argmax(gains))
         if gains[best] <= (1.0 + LITTLE) * taken:
             break
-        law, taken = tried[best], gains[best]
+        law = tried[best]
     return law
 
 
@@ -111,11 +121,3 @@ def _slopes(found: Rows, among: Among, acting: Acting) -> Array:
         (below,), (above,) = found.of(among.member(low), acting), found.of(among.member(high), acting)
         out.append((above - below) / float(own @ (high - low)))
     return np.column_stack(out)
-
-
-def _taken(found: Rows, model: Regression, law: Law) -> float:
-    """What a law takes of the square that a model leaves."""
-    q, _ = np.linalg.qr(model.design)
-    (f,) = found.of(law, model.acting)
-    f = f - q @ (q.T @ f)
-    return float((f @ (model.left - q @ (q.T @ model.left))) ** 2 / max(f @ f, 1e-300))

@@ -12,7 +12,7 @@ from ema.effects import registry
 TOOLS = Path(__file__).resolve().parents[2] / "tools"
 
 
-@pytest.fixture(params=["effect_reference", "model_reference"])
+@pytest.fixture(params=["effect_reference", "frame_reference", "model_reference"])
 def tool(request):
     spec = importlib.util.spec_from_file_location(request.param, TOOLS / f"{request.param}.py")
     tool = importlib.util.module_from_spec(spec)
@@ -21,7 +21,7 @@ def tool(request):
 
 
 def test_the_page_is_that_of_the_code(tool):
-    """If not: python tools/effect_reference.py, or model_reference.py"""
+    """If not: python tools/effect_reference.py, or frame_ or model_reference.py"""
     assert tool.PAGE.read_text(encoding="utf-8") == tool.page()
 
 
