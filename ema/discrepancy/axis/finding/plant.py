@@ -126,17 +126,19 @@ class AxisPlant:
         return [*candidates.library(self, point, blocks), *self._suggest(point)]
 
     def _suggest(self, point: Point) -> list[Candidate]:
-        """What the balance needs, by the drive as it is taken now and as it was taken before.
+        """What the balance needs, by the drive as it is taken now, and what else it needed as it was taken before.
 
         With the drive taken another way the balance may do without a law: then free runs must tell it from what fits
-        as well, as a motor that saturates and friction by the square of its torque do.
+        as well, as a motor that saturates and friction by the square of its torque do. A law that it still needs is
+        begun where it has it now: the same twice, a line of nearly the same order, would be its own rival.
         """
         ways = [self.balance, *(b for way, b in self._balances.items() if way != self.between)]
-        found: dict[str, Candidate] = {}
+        found: list[Candidate] = []
+        shown: set[str | None] = set()
         for b in ways:
-            for c in suggest_by_balance(b, self.plant, point):
-                found.setdefault(c.key, c)
-        return [*found.values()]
+            found += [c for c in suggest_by_balance(b, self.plant, point) if c.effect not in shown]
+            shown |= {c.effect for c in suggest_by_balance(b, self.plant, {})}
+        return found
 
     def seen_together(self, point: Point) -> list[Candidate]:
         """Effects that channels and the balance of torque show beside each other, begun where these have them."""
