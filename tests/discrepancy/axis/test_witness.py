@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ema.discrepancy.axis.judging import witness
+from ema.discrepancy.axis.judging import agreeing, witness
 from ema.discrepancy.axis.judging.agreeing import merge
 
 
@@ -36,3 +36,14 @@ def test_a_law_that_does_nothing_in_free_runs_is_not_added(plant, monkeypatch):
     assert witness.measure_support(plant, plain(plant), plant.balance, [term])[0] < 0.1
     assert names(merge(plant, [], "unexplained", plain(plant), follows=True)) == []
     assert names(merge(plant, [], "unexplained", plain(plant))) == ["friction_slope"]
+
+
+def test_a_law_that_free_runs_need_in_part_is_as_sure_as_that_with_the_same_interval(plant, monkeypatch):
+    def merged(share):
+        monkeypatch.setattr(agreeing, "measure_support", lambda *_: [share])
+        ((found,), _) = merge(plant, [], "unexplained", plain(plant), follows=True)
+        return found
+
+    whole, part = merged(1.0), merged(0.97)
+    assert part.confidence == pytest.approx(0.97 * whole.confidence, abs=1e-3)
+    assert part.parameters == whole.parameters

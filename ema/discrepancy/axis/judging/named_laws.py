@@ -84,7 +84,7 @@ def _effect(plant: AxisPlant, b: Balance, term: Term, name: str) -> shared.Found
     effect, linear = registry()[name], plant.plant.is_linear
     said = partial(of_axis, linear=linear)
     values = effects(b, term)[name]
-    samples = [drawn[name] for drawn in draw_effects(b, term)]
+    samples = [drawn[name] for drawn in draw_effects(b, term) if name in drawn]
     units = units_of(effect, said)
     parameters = {
         key: shared.Quantity(value, *interval(key, value, [s[key] for s in samples]), units[key])

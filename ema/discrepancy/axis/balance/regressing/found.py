@@ -139,7 +139,8 @@ def draw_law(b: Balance, term: Term) -> list[tuple[Law, Array]]:
     part = b.model.part(term.law)
     own = draw(b)[:, part]
     out = [(term.law, c) for c in own]
-    for at, other in _draw_others(term.members, (1, b.terms.index(term))):
+    seed = (1, [t.law.key for t in b.terms].index(term.law.key))  # by its place: a copy less sure draws the same
+    for at, other in _draw_others(term.members, seed):
         law = other.laws[-1]
         moved = other.coefficients[other.part(law)] - b.model.coefficients[part]
         for k in at:
