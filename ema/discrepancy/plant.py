@@ -110,6 +110,11 @@ class Plant(Protocol):
         """Relative standard deviation of the noise model's amplitude: 0 where it was declared."""
         ...
 
+    @property
+    def noise_uncertainties(self) -> Sequence[float]:
+        """The same for averages over `verdict.GROUPS` of samples."""
+        ...
+
     def residuals(self, points: Sequence[Point], blocks: Sequence[int]) -> list[list[Array]]:
         """Whitened residuals by point and block, each of shape (n_channels, n_times)."""
         ...

@@ -78,7 +78,7 @@ def is_nearly_noise(plant: Plant, model: Tried) -> bool:
 def judge_model(plant: Plant, model: Tried) -> Verdict:
     """Whether what a model leaves of held-out parts is noise."""
     n_free = sum(len(f.free) for f in model.fits)
-    return judge(model.held_out, noise_uncertainty=plant.noise_uncertainty, n_free=n_free)
+    return judge(model.held_out, noise_uncertainty=plant.noise_uncertainties, n_free=n_free)
 
 
 def select(plant: Plant, state: State, progress: Progress) -> None:

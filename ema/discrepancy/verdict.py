@@ -15,6 +15,7 @@ GROUPS = (1, 8, 64)  # samples averaged before a chi-square: the time scales loo
 N_LAGS = 8
 MIN_PAIRS = 30  # of residuals, for their correlation to be one of many products
 BOUND = 1.0  # relative uncertainty of an amplitude that is known to its order of magnitude
+MOSTLY = 0.5 * BOUND
 CLIP = 5.0  # a single wild sample is not a cause
 
 
@@ -32,13 +33,18 @@ class Verdict:
         return self.p_value >= FALSE_ALARMS
 
 
+def average(block: Array, group: int) -> Array:
+    """Means over so many samples each, of unit variance where those of the block are, (n_channels, n_groups)."""
+    n = block.shape[1] // group * group
+    return np.asarray(block[:, :n].reshape(len(block), -1, group).sum(axis=2) / np.sqrt(group))
+
+
 def scale_test(residuals: Sequence[Array], group: int, noise_uncertainty: float, n_free: int) -> float:
     """P-value of the mean square of group means being no larger than noise makes it."""
     total, count = 0.0, 0
     for block in residuals:
-        n = block.shape[1] // group * group
-        if n:
-            means = np.clip(block[:, :n], -CLIP, CLIP).reshape(len(block), -1, group).sum(axis=2) / np.sqrt(group)
+        if block.shape[1] >= group:
+            means = average(np.clip(block, -CLIP, CLIP), group)
             total += float((means**2).sum())
             count += means.size
     if count <= n_free:
@@ -68,17 +74,25 @@ def correlation_test(residuals: Sequence[Array]) -> float:
     return float(stats.chi2.sf(statistic, used)) if used else 1.0
 
 
-def judge(residuals: Sequence[Array], *, noise_uncertainty: float = 0.0, n_free: int = 0) -> Verdict:
+def judge(
+    residuals: Sequence[Array], *, noise_uncertainty: float | Sequence[float] = 0.0, n_free: int = 0
+) -> Verdict:
     """Verdict on residuals.
 
-    Noise of which nothing but a bound is known (`BOUND`) may have any shape: then only its size is tested.
+    Noise of which mostly a bound is known (`MOSTLY`) may have any shape: then only its size is tested.
+
+    Parameters
+    ----------
+    noise_uncertainty : float or sequence of floats, shape (n_groups,)
+        Relative, of the noise's amplitude, alike or for averages over `GROUPS` of samples.
     """
-    groups = GROUPS if noise_uncertainty < BOUND else GROUPS[:1]
+    of = dict(zip(GROUPS, np.broadcast_to(noise_uncertainty, len(GROUPS)).tolist(), strict=True))
     p = {
-        f"residual larger than noise at {g} samples": scale_test(residuals, g, noise_uncertainty, n_free)
-        for g in groups
+        f"residual larger than noise at {g} samples": scale_test(residuals, g, unsure, n_free)
+        for g, unsure in of.items()
+        if g == GROUPS[0] or unsure < MOSTLY
     }
-    if noise_uncertainty < BOUND:
+    if of[GROUPS[0]] < MOSTLY:
         p["neighbouring residuals are correlated"] = correlation_test(residuals)
     corrected = {name: min(1.0, value * len(p)) for name, value in p.items()}
     because = min(corrected, key=lambda name: corrected[name])

@@ -40,6 +40,7 @@ class Columns:
     """A plant whose effects are columns, by block; `acting` is what its record holds beside noise."""
 
     noise_uncertainty = 0.0
+    noise_uncertainties = (0.0, 0.0, 0.0)
     base = ()
     structure = candidates = errors = describe = describe_structure = None
 

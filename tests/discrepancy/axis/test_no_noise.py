@@ -42,6 +42,40 @@ def test_what_moves_slowly_within_a_bound_is_no_cause_and_beyond_it_is():
     assert not judge([4.0 * x for x in slow], noise_uncertainty=BOUND).is_noise
 
 
+@pytest.fixture(scope="module")
+def fine_encoder(support):
+    """An axis whose encoder shows no noise, by a current that does, with what is hidden of its drag (drag by rate)."""
+    other = support("axis_other")
+
+    def made(hidden, seed):
+        noise = {"position": 2e-7, "speed": 0.05, "drive": 0.02, "u": 0.02, "i": 5e-3}
+        of = [0.0] * 8
+        of[other.VISCOUS] = hidden
+        setup = replace(
+            other.SETUPS["clean"], noise=noise, counts=1e-6, channels=("i_q", "theta_m"), duration=4.0, hidden=tuple(of)
+        )
+        return AxisPlant(RotaryAxis.model_validate(other.plant(setup)), [other.record(setup, seed)])
+
+    return made
+
+
+def test_noise_that_a_current_shows_and_the_motion_integrates_is_no_bound(fine_encoder):
+    sample, few, many = fine_encoder(0.0, 1).noise_uncertainties
+    assert sample > few > many
+    assert many < 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 3])
+def test_what_is_seen_beside_the_noise_of_the_current_is_named_though_the_encoder_has_none(fine_encoder, seed):
+    """Samples one by one are within what a simulation may miss of the encoder; their averages are not."""
+    assert examine_ways(fine_encoder(0.0, seed)).verdict == "adequate"
+    (drag,) = examine_ways(fine_encoder(6e-5, seed)).effects
+    assert drag["name"] == "viscous_drag"
+    low, high = (drag["parameters"]["coefficient"][end] for end in ("low", "high"))
+    assert low < 6e-5 < high
+
+
 @pytest.mark.slow
 def test_drag_beside_bristles_is_named_without_a_gear_that_gives(support):
     other = support("axis_other")

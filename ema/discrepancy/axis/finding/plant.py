@@ -24,11 +24,11 @@ from ema.discrepancy.axis.reading.undersampled import refuse_undersampled
 from ema.discrepancy.axis.reading.windows import Bench, Window, bench
 from ema.discrepancy.axis.scanning import structure
 from ema.discrepancy.axis.scanning.zeros import zeros
-from ema.discrepancy.axis.simulating.noise_model import position_noise, whitener, without_start
+from ema.discrepancy.axis.simulating.noise_model import measure_bounded, position_noise, whitener, without_start
 from ema.discrepancy.axis.simulating.pack import Pack
 from ema.discrepancy.axis.simulating.predictable import LONGEST_WINDOW, predictable_time
 from ema.discrepancy.plant import Block, Candidate, Errors, Fitted, Free, Point
-from ema.discrepancy.verdict import BOUND
+from ema.discrepancy.verdict import BOUND, GROUPS
 from ema.models import axis
 from ema.models.axis_config import INSTANCE, LINES, Axis
 from ema.models.axis_layout import row
@@ -110,10 +110,20 @@ class AxisPlant:
     @property
     def noise_uncertainty(self) -> float:
         """Zero where the plant file declares the noise of every channel that is compared; large where none has any."""
+        return self.noise_uncertainties[0]
+
+    @cached_property
+    def noise_uncertainties(self) -> tuple[float, ...]:
+        """The same for averages over samples."""
         if all(noise.declared for b in self.benches for noise in b.noise.values()):
-            return 0.0
+            return (0.0,) * len(GROUPS)
         compared = [b.noise[name] for b in self.benches for name in (b.noise if b.static else b.roles.outputs)]
-        return BOUND if all(noise.is_bound for noise in compared) else ESTIMATE_UNCERTAINTY
+        if not all(noise.is_bound for noise in compared):
+            return (ESTIMATE_UNCERTAINTY,) * len(GROUPS)
+        pairs = zip(self._bench_of, self.windows, strict=True)
+        bounded = [measure_bounded(self.plant, b, w, GROUPS) for b, w in pairs if not w.static]
+        share = np.mean(bounded, axis=0) if bounded else np.ones(len(GROUPS))
+        return tuple(np.hypot(ESTIMATE_UNCERTAINTY, BOUND * share).tolist())
 
     def residuals(self, points: Sequence[Point], blocks: Sequence[int]) -> list[list[Array]]:
         """Whitened residuals, clipped where a window runs away."""

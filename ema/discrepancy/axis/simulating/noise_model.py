@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +11,13 @@ from scipy.ndimage import maximum_filter1d
 from ema.core.records import Array
 from ema.discrepancy.axis.reading.pushed import LEAST_R, pushed
 from ema.discrepancy.axis.reading.windows import HALF, START_NOISE, Bench, Window, speed_noise
+from ema.discrepancy.verdict import average
 from ema.models.axis_config import Axis
 
 from .whitening import Filter, Push, design, open_loop_variance, variance_without_start
 
 TURNING = 0.1  # of a sample: how well the moment is known at which friction turns round
+N_DRAWN = 4  # records of noise, of each window
 FIRST, FIRST_PART = 12, 4  # samples at least, and share of a window, to which its start state is fitted
 
 
@@ -51,6 +54,19 @@ def whitener(p: Axis, b: Bench, w: Window) -> Filter:
     """The filter that makes a window's residual white."""
     m = noise_model(p, b, w)
     return design(m.H, m.noise, m.push, m.excursion)
+
+
+def measure_bounded(p: Axis, b: Bench, w: Window, groups: Sequence[int]) -> Array:
+    """Share of the variance of a window's residual, averaged over so many samples, that only a bound is known of.
+
+    Made by outputs without noise of their own (all of it where the drive has none either). Noise of a drive is
+    integrated: where it is slow, it makes nearly all of a residual, however little is known of the output's.
+    """
+    if b.noise[b.roles.drive].is_bound or not all(b.noise[name].is_bound for name in b.roles.outputs):
+        return np.full(len(groups), float(b.noise[b.roles.drive].is_bound))
+    of_outputs = noise_model(p, b, w).noise * np.random.default_rng(0).standard_normal((N_DRAWN, *np.shape(w.outputs)))
+    made = np.concatenate([whitener(p, b, w).whiten(x) for x in of_outputs])
+    return np.array([np.mean(average(made, min(g, w.n)) ** 2) for g in groups])
 
 
 def noise_model(p: Axis, b: Bench, w: Window, *, turning: bool = True) -> NoiseModel:
