@@ -123,11 +123,12 @@ class Rereading:
 def _is_no_worse(taken: Tried, further: Tried) -> bool:
     """Whether records taken another way foretell as much as with a further effect.
 
-    A drive that is held is half a sample late, and what delays it has a parameter to fit besides: it must be clearly
-    better.
+    A drive that is held is half a sample late, and what delays it or a sensor has a parameter to fit besides: it must be
+    clearly better.
     """
     gain = compare(further, taken)
-    return not gain.is_clear if any(f.name in OF_DRIVE for f in further.accepted[-1].free) else gain.gain <= 0.0
+    is_late = any(f.name in OF_DRIVE or f.name in DELAYS for f in further.accepted[-1].free)
+    return not gain.is_clear if is_late else gain.gain <= 0.0
 
 
 def _find_doubt(plant: AxisPlant, outcome: Outcome) -> str:
