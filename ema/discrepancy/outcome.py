@@ -8,6 +8,7 @@ from typing import Any
 from .folds import Folds
 from .grade import Left, Verdict
 from .plant import Point
+from .selection import Tried
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,8 @@ class Outcome:
         Sets of effects with their probabilities: as in `Findings.posterior`.
     point : Point
         All fitted values of the final model.
+    model : Tried
+        That model, by held-out parts.
     """
 
     verdict: Verdict
@@ -66,6 +69,7 @@ class Outcome:
     k_before: list[float]
     k_after: list[float]
     records: list[RecordGain]
+    model: Tried
     tried: list[dict[str, Any]]
     mimicked: tuple[str, ...] = ()
     k_error: tuple[float, ...] = ()

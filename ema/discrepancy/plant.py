@@ -119,6 +119,13 @@ class Plant(Protocol):
         """Whitened residuals by point and block, each of shape (n_channels, n_times)."""
         ...
 
+    def made_by_noise(self, point: Point, blocks: Sequence[int], residuals: Sequence[Array]) -> Sequence[Array]:
+        """Squares that noise of what drives a simulation adds to `residuals`, (n_times,) by block; none: in all alike.
+
+        That depends on the model: one that follows its drive with a lag takes noise from it.
+        """
+        ...
+
     def candidates(self, point: Point, blocks: Sequence[int]) -> Sequence[Candidate]:
         """Effects that could be added to the model at `point`, with starts found on `blocks` only."""
         ...

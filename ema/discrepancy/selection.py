@@ -42,12 +42,16 @@ def split_into_folds(blocks: Sequence[Block]) -> list[list[int]]:
 
 @dataclass(frozen=True)
 class Tried:
-    """A model fitted on all but one fold, for each fold: `fits`; `held_out` are residuals of the left-out blocks."""
+    """A model fitted on all but one fold, for each fold: `fits`; `held_out` are residuals of the left-out blocks.
+
+    `by_noise` are the squares that noise of what drives the simulation is expected to add to these (`made_by_noise`).
+    """
 
     accepted: tuple[Candidate, ...]  # by fold the candidates' parameters may differ; these are the first fold's
     fits: tuple[Fit, ...]
     models: tuple[tuple[Candidate, ...], ...]
     held_out: tuple[Array, ...]
+    by_noise: tuple[Array, ...] = ()
 
     @property
     def scale(self) -> float:
@@ -121,9 +125,14 @@ def compare(one: Tried, other: Tried, scale: float | None = None) -> Comparison:
 
 
 def log_scores(tried: Tried, scale: float) -> Array:
-    """Held-out log-likelihood of each part of the records, shape (n_parts,), up to a constant. [nats]"""
+    """Held-out log-likelihood of each part of the records, shape (n_parts,), up to a constant. [nats]
+
+    What a model takes from a residual by taking the drive's noise is not counted for it.
+    """
     n = max(1, -(-MIN_PARTS // max(len(tried.held_out), 1)))
     blocks = log_likelihood(tried.held_out, scale)
+    if tried.by_noise:
+        blocks = [own + 0.5 * squares / scale**2 for own, squares in zip(blocks, tried.by_noise, strict=True)]
     return np.array([float(part.sum()) for block in blocks for part in np.array_split(block, n)])
 
 
@@ -147,10 +156,13 @@ def fit_model(
         fits.append(best_fit(plant, free, start, blocks, frozen=known))
     fits = [_help_by_other_folds(plant, own, fits) for own in fits]
     held: dict[int, Array] = {}
+    by_noise: dict[int, Array] = {}
     for (_, left_out), fitted in zip(parts, fits, strict=True):
-        held.update(zip(left_out, plant.residuals([fitted.point], left_out)[0], strict=True))
-    ordered = tuple(held[j] for j in range(len(plant.blocks)))
-    return Tried(tuple(models[0]), tuple(fits), tuple(tuple(m) for m in models), ordered)
+        residuals = plant.residuals([fitted.point], left_out)[0]
+        held.update(zip(left_out, residuals, strict=True))
+        by_noise.update(zip(left_out, plant.made_by_noise(fitted.point, left_out, residuals), strict=False))
+    ordered, noise = (tuple(of[j] for j in sorted(of)) for of in (held, by_noise))
+    return Tried(tuple(models[0]), tuple(fits), tuple(tuple(m) for m in models), ordered, noise)
 
 
 def _help_by_other_folds(plant: Plant, own: Fit, fits: Sequence[Fit]) -> Fit:

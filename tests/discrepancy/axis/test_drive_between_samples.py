@@ -6,12 +6,14 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import geared
+import numpy as np
 import pytest
 
 from ema.core.records import Cycle, Record
 from ema.discrepancy.axis.finding import between
 from ema.discrepancy.axis.finding.between import examine_ways
 from ema.discrepancy.axis.finding.plant import AxisPlant
+from ema.discrepancy.selection import Tried
 from ema.models.axis_config import RotaryAxis
 
 SMALL = geared.Axis(J=1.1e-5, F=7e-3, C=4.7e-6, k_t=0.0125)
@@ -43,13 +45,18 @@ def test_a_held_drive_is_told(outcome):
 
 
 def _outcome(left, *effects):
-    return SimpleNamespace(effects=effects, records=[SimpleNamespace(rms_before=40.0, rms_after=left)])
+    model = Tried((), (), (), (np.full((1, 4000), left),))
+    return SimpleNamespace(effects=effects, model=model, records=[SimpleNamespace(rms_before=40.0, rms_after=left)])
 
 
-@pytest.mark.parametrize(("one", "other", "is_taken"), [(2.0, 1.2, True), (2.0, 1.9, False), (0.8890, 0.8892, False)])
+@pytest.mark.parametrize(
+    ("one", "other", "is_taken"),
+    [(2.0, 1.2, True), (2.0, 1.9, False), (0.8890, 0.8892, False), (1.001, 1.0002, False)],
+)
 def test_another_way_with_more_effects_is_taken_where_it_leaves_far_less_than_noise_makes(one, other, is_taken):
     """A drive that is held leaves what noise makes, and so does one that runs straight and is late by half a sample.
 
     Where the noise was told too large both leave less than one, and less than half of a negative rest was "far less".
+    So was less than half of a thousandth.
     """
     assert between._is_simpler(_outcome(other, "drag", "late"), _outcome(one, "drag")) == is_taken

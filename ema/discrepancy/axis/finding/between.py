@@ -202,16 +202,14 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     """
     if plant.plant.drive == "speed-loop":
         return plant.between
-    blocks = range(len(plant.blocks))
     here, period = plant.between, _period(plant)
 
     def taken(way: str) -> Tried:
         plant.between = way
         less = (LATE[way] - LATE[here]) * period
-        shorter = plant.residuals([_shorten_delays(outcome.point, less)], blocks)[0]
-        found = [Tried((), (), (), tuple(shorter))]
+        found = [_tried(plant, _shorten_delays(outcome.point, less))]
         if way != here and OF_DRIVE.keys() & outcome.point.keys():
-            found.append(Tried((), (), (), tuple(_with_constant_delay(plant, outcome.point, less).residuals)))
+            found.append(_tried(plant, _with_constant_delay(plant, outcome.point, less).point))
         return max(found, key=lambda own: compare(own, found[0]).gain)
 
     ways = {way: taken(way) for way in LATE}
@@ -225,6 +223,13 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     later = sum(outcome.point.get(name, 0.0) for name in OF_DRIVE) / period
     by_drive = [way for way in LATE if way != "straight" and abs(later - LATE[way]) < NEARLY_HALF]
     return ("held" if by_half else next(iter(by_drive), here)) if here == "straight" else here
+
+
+def _tried(plant: AxisPlant, point: Point) -> Tried:
+    """A model at a point, by all blocks."""
+    blocks = range(len(plant.blocks))
+    residuals = plant.residuals([point], blocks)[0]
+    return Tried((), (), (), tuple(residuals), tuple(plant.made_by_noise(point, blocks, residuals)))
 
 
 def _with_constant_delay(plant: AxisPlant, point: Point, less: float) -> Fit:
@@ -256,13 +261,13 @@ def _widen_delay(plant: AxisPlant, outcome: Outcome) -> None:
 
 
 def _widen_by_ways(plant: AxisPlant, outcome: Outcome, name: str, told: list[dict[str, float]]) -> None:
-    here, period, fits = plant.between, _period(plant), {}
+    here, period, fits, tried = plant.between, _period(plant), {}, {}
     for way in LATE:
         plant.between = way
         point = _shorten_delays(outcome.point, (LATE[way] - LATE[here]) * period)
         fits[way] = _fit_delay(plant, name, point)
+        tried[way] = _tried(plant, fits[way].point)
     plant.between = here
-    tried = {way: Tried((), (), (), tuple(f.residuals)) for way, f in fits.items()}
     for way, f in fits.items():
         if not compare(tried[here], tried[way]).is_clear:
             for interval in told:
@@ -278,11 +283,12 @@ def _shorten_delays(point: Point, by: float) -> Point:
 
 
 def _is_simpler(other: Outcome, one: Outcome) -> bool:
-    """Whether less is left, hardly more by fewer effects, or far less by more."""
+    """Whether held-out parts are likelier, hardly less is left by fewer effects, or far less and clearly by more."""
     rest, other_rest = (max(r.rms_after for r in o.records) for o in (one, other))
+    gain = compare(other.model, one.model)
     if len(other.effects) > len(one.effects):
-        return max(other_rest**2 - 1.0, 0.0) < MUCH * max(rest**2 - 1.0, 0.0)
+        return gain.is_clear and max(other_rest**2 - 1.0, 0.0) < MUCH * max(rest**2 - 1.0, 0.0)
     if len(other.effects) == len(one.effects):
-        return other_rest < rest
+        return gain.gain > 0.0
     hardly = LITTLE * max(r.rms_before for r in one.records) ** 2
     return other_rest < ALIKE * rest or other_rest**2 < rest**2 + hardly

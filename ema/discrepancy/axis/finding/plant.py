@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +21,7 @@ from ema.discrepancy.axis.reading.intake import take_in
 from ema.discrepancy.axis.reading.lateness import see_delays
 from ema.discrepancy.axis.reading.measured import Zero
 from ema.discrepancy.axis.reading.noise import ESTIMATE_UNCERTAINTY
+from ema.discrepancy.axis.reading.noisier import add_noise
 from ema.discrepancy.axis.reading.undersampled import refuse_undersampled
 from ema.discrepancy.axis.reading.windows import Bench, Window, bench
 from ema.discrepancy.axis.scanning import structure
@@ -27,6 +29,7 @@ from ema.discrepancy.axis.scanning.zeros import zeros
 from ema.discrepancy.axis.simulating.noise_model import measure_bounded, position_noise, whitener, without_start
 from ema.discrepancy.axis.simulating.pack import Pack
 from ema.discrepancy.axis.simulating.predictable import LONGEST_WINDOW, predictable_time
+from ema.discrepancy.fitting import HUBER
 from ema.discrepancy.plant import Block, Candidate, Errors, Fitted, Free, Point
 from ema.discrepancy.verdict import BOUND, GROUPS
 from ema.models import axis
@@ -128,6 +131,21 @@ class AxisPlant:
     def residuals(self, points: Sequence[Point], blocks: Sequence[int]) -> list[list[Array]]:
         """Whitened residuals, clipped where a window runs away."""
         return self._map(lambda point: self.whitened(point, blocks), points)
+
+    def made_by_noise(self, point: Point, blocks: Sequence[int], residuals: Sequence[Array]) -> list[Array]:
+        """Squares that the noise of the recorded drive adds to the `residuals` at a point, shape (n_times,) by block."""
+        self._noisier.between = self.between
+        again = self._noisier.whitened(point, blocks)
+        return [np.sum(np.clip(b - a, -HUBER, HUBER) ** 2, axis=0) for a, b in zip(residuals, again, strict=True)]
+
+    @cached_property
+    def _noisier(self) -> AxisPlant:
+        """The same with a further draw of the drive's noise, where it shows any."""
+        other = copy(self)
+        benches = (b if b.static or b.noise[b.roles.drive].is_bound else add_noise(b) for b in self.benches)
+        other._take([*benches])
+        other.filters = self.filters
+        return other
 
     def candidates(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Library effects with bounds and starts for this axis."""

@@ -49,8 +49,21 @@ def quieten(t: Array, drive: Array, gaps: NDArray[np.int_], noise: Noise) -> tup
         if not agreed.any() or _takes_a_wave(np.where(agreed, (drive - wide) / sigma, 0.0), width):
             break
         quiet, left = np.where(agreed, wide, quiet), np.where(agreed, share, left)
+    return _give_back(drive, quiet, left, gaps), left
+
+
+def quieten_alike(x: Array, left: Array) -> Array:
+    """What becomes of `x`, recorded without a gap, where a drive was smoothed so that `left` is left of its noise."""
+    quiet, gaps = x, np.empty(0, int)
+    for width in WIDTHS:
+        here = np.isclose(left, left_of_noise(width, DEGREE))
+        quiet = np.where(here, smooth(x, gaps, width, degree=DEGREE), quiet) if here.any() else quiet
+    return _give_back(x, quiet, left, gaps)
+
+
+def _give_back(drive: Array, quiet: Array, left: Array, gaps: NDArray[np.int_]) -> Array:
     slow = smooth(drive - quiet, gaps, WIDTHS[-1], degree=DEGREE)
-    return np.where(left < 1.0, quiet + slow, drive), left
+    return np.where(left < 1.0, quiet + slow, drive)
 
 
 def _takes_a_wave(taken: Array, width: int) -> bool:
