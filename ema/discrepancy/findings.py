@@ -13,7 +13,7 @@ from ema.core.version import version
 from ema.effects import registry
 
 from .folds import Folds
-from .grade import Verdict
+from .grade import UPPER, Verdict
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,15 @@ class Gain:
         """The same in words, of which of the two it is."""
         is_error = self.rest == self._rest_of_error
         what = "the error of free runs" if is_error else "the residual weighed by its noise"
-        return f"{self.rest:.3g} times what noise makes is left, of {what}"
+        times = self.folds.told_rest if is_error and self.folds else f"{self.rest:.3g}"
+        return f"{times} times what noise makes is left, of {what}"
+
+    @property
+    def is_rest_sure(self) -> bool:
+        """Whether more than noise is left by more than parts scatter."""
+        if self.folds is None or len(self.folds.names) < 2 or self.rest > self._rest_of_error:
+            return True
+        return self.rest * float(np.exp(-UPPER * self.folds.relative_rest_error)) > 1.0
 
     @property
     def _rest_of_error(self) -> float:
@@ -241,6 +249,8 @@ class Findings:
             )
         if self.verdict == "partly explained":
             left = f"That is not all: {self.gain.told_rest} on held-out parts"
+            if not self.gain.is_rest_sure:
+                left = f"That may not be all: {self.gain.told_rest} on held-out parts, no more than these scatter"
             said.append(left + ("; its structure: " + describe(self.structure) if self.structure else "") + ".")
         if self.verdict == "unexplained":
             none = (

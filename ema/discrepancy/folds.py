@@ -113,11 +113,12 @@ class Folds:
 
     def sentence(self, scale: float, unit: str) -> str:
         """The gain with its error, in words."""
-        gain, error = (_short(scale * abs(x)) for x in (self.gain, self.gain_error))
-        how = "better" if self.gain >= 0.0 else "worse"
+        numbers = (self.err_before, self.err_after, abs(self.gain), self.gain_error)
+        before, after, gain, error = (_short(scale * x) for x in numbers)
+        how = "falls" if self.gain >= 0.0 else "grows"
         return (
-            f"Held out one by one, {len(self.names)} parts are foretold {how} by {gain} ± {error} {unit}; "
-            f"what is left is {self.told_rest} times what noise makes of it."
+            f"Held out one by one, the error of {len(self.names)} parts {how} from {before} to {after} {unit}, by {gain} "
+            f"± {error}; what is left is {self.told_rest} times what noise makes of it."
         )
 
     def as_dict(self) -> dict[str, Any]:

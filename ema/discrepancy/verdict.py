@@ -74,9 +74,7 @@ def correlation_test(residuals: Sequence[Array]) -> float:
     return float(stats.chi2.sf(statistic, used)) if used else 1.0
 
 
-def judge(
-    residuals: Sequence[Array], *, noise_uncertainty: float | Sequence[float] = 0.0, n_free: int = 0
-) -> Verdict:
+def judge(residuals: Sequence[Array], *, noise_uncertainty: float | Sequence[float] = 0.0, n_free: int = 0) -> Verdict:
     """Verdict on residuals.
 
     Noise of which mostly a bound is known (`MOSTLY`) may have any shape: then only its size is tested.

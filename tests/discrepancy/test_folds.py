@@ -54,5 +54,14 @@ def test_every_part_is_left_out_once_and_neighbours_are_apart():
 
 
 def test_a_loss_is_told_as_one():
-    assert "foretold better by 0.02 " in folds([0.01, 0.01], [0.03, 0.03]).sentence(1.0, "A")
-    assert "foretold worse by 0.02 " in folds([0.05, 0.05], [0.03, 0.03]).sentence(1.0, "A")
+    assert "falls from 0.03 to 0.01 A, by 0.02 ±" in folds([0.01, 0.01], [0.03, 0.03]).sentence(1.0, "A")
+    assert "grows from 0.03 to 0.05 A, by 0.02 ±" in folds([0.05, 0.05], [0.03, 0.03]).sentence(1.0, "A")
+
+
+@pytest.mark.parametrize(
+    ("after", "said"), [([0.012, 0.013, 0.014], "is not all"), ([0.004, 0.003, 0.03], "may not be")]
+)
+def test_a_rest_that_parts_scatter_by_is_not_told_as_sure(after, said):
+    rest = Findings("partly explained", [], gain(folds(after))).sentences()[-1]
+    assert said in rest
+    assert "±" in rest

@@ -58,7 +58,7 @@ def test_sets_and_what_would_tell_them_apart_are_shown(full, tmp_path):
         "not known",
     ):
         assert words in text
-    assert "Held out one by one, 2 parts are foretold better by" in text
+    assert "Held out one by one, the error of 2 parts falls from" in text
     for screen in SCREENS if BROWSER is not None else ():
         seen = look(page, *screen)
         assert seen["found"] == []
