@@ -21,6 +21,7 @@ POSITIONS = ("theta_m", "q", "theta_u", "theta_n")  # come to rest where they tu
 COMMANDS = ("theta_ref", "q_ref", "theta_cmd", "w_ref")  # may dwell where they like
 ENDS = 0.002  # share of a channel's samples at its end from which that is a limit, not a peak
 BY_CHANCE = 1e-6  # probability of as many repeated rows in a record that lost none
+CAUGHT_UP = 1.5  # times the step before: halfway from one that goes on (1) to one that makes up for a lost one (2)
 HIGH = (0.6, 0.95)  # upper part of the spectrum, of half the sampling rate
 FALLEN = 0.02  # power in that part, of all but the mean, below which a channel has fallen off [1]
 
@@ -109,7 +110,8 @@ def count_repeated(record: Record) -> int:
     """Rows that repeat the one before in every measured channel, 0 where as many do by chance.
 
     Looked at is the channel that stays least often as it was, where it moves before and after: as often as the others
-    stay at any time, they stay there by chance.
+    stay at any time, they stay there by chance. A position that was lost catches up; one that goes from count to count
+    does not, and what a controller makes of it stays with it.
     """
     names = [name for name in record.channels if name not in ("t", *COMMANDS)]
     stays = [np.array([np.diff(cycle[name]) == 0.0 for name in names]) for cycle in record.cycles]
@@ -119,13 +121,23 @@ def count_repeated(record: Record) -> int:
         return 0
     least, *others = sorted(moving, key=lambda j: share[j])
     n, alone, together, free = 0, 0, 0, 0
-    for of in stays:
+    before, after = 0.0, 0.0  # by how much positions change about what repeats
+    positions = [names[j] for j in moving if names[j] in POSITIONS]
+    for cycle, of in zip(record.cycles, stays, strict=True):
         own, rest = of[least], np.asarray(np.all(of[others], axis=0))
         once = own[1:-1] & ~own[:-2] & ~own[2:]
-        n += int((once & rest[1:-1]).sum())
+        for name in positions:
+            once &= (np.diff(cycle[name])[:-2] != 0.0) & (np.diff(cycle[name])[2:] != 0.0)
+        repeats = once & rest[1:-1]
+        n += int(repeats.sum())
+        for name in positions:
+            change = np.abs(np.diff(cycle[name]))
+            before, after = before + change[:-2][repeats].sum(), after + change[2:][repeats].sum()
         alone += int(once.sum())
         together += int((rest & ~own).sum())
         free += int((~own).sum())
+    if positions and after < CAUGHT_UP * before:
+        return 0
     by_chance = alone * together / max(free, 1)
     return n if stats.poisson.sf(n - 1, by_chance) < BY_CHANCE else 0
 

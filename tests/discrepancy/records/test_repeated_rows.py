@@ -41,6 +41,17 @@ def test_what_rests_or_is_coarse_has_lost_nothing(how):
     assert all(count_repeated(record(**how, seed=seed)[0]) == 0 for seed in range(5))
 
 
+@pytest.mark.parametrize("counts", [1e-3, 3e-3])
+def test_a_slow_axis_goes_from_count_to_count_and_a_duty_with_it(counts):
+    """A servo's duty is what it makes of its counts: where they stay it stays."""
+    t = DT * np.arange(N)
+    theta = np.round(np.sin(2.0 * np.pi * 0.5 * t) / counts) * counts
+    slow = np.concatenate(([0.0], np.diff(theta))) / DT
+    duty = 0.3 * (np.round(2.0 * t) / 2.0 - theta) - 0.002 * slow
+    made = Record((Cycle(1, {"t": t, "theta_m": theta, "duty": duty}),))
+    assert count_repeated(made) == 0
+
+
 def test_a_real_recorder_has_lost_some():
     """Position, speed and current stay for a millisecond in which the voltage goes on, and then catch up."""
     assert 30 < count_repeated(read_record(DATA / "laas_mn4004" / "sine.csv")) < 50
