@@ -15,6 +15,7 @@ from .records import Array, Cycle, Record
 from .table import Table
 from .units import convert, is_unit
 
+NONE = "1"  # the unit of a ratio, which a column need not name
 _HEADER = re.compile(r"^(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?$")
 _ROUND = re.compile(r"^(?P<name>[^()]+?)\s*\((?P<unit>[^()]+)\)$")
 
@@ -88,6 +89,8 @@ def _columns(table: Table, side: sidecar.Sidecar) -> dict[int, _Column]:
         if name == "cycle":
             found[index] = (name, (1.0, 0.0), None)
             continue
+        if unit is None and CHANNELS[name].unit == NONE:
+            unit = NONE
         if unit is None:
             raise RecordError(
                 f"{path}: column '{title}' has no unit, expected '{name} [{CHANNELS[name].unit}]' or a unit in "

@@ -199,3 +199,10 @@ def test_large_file_is_read_whole(tmp_path):
     (cycle,) = read_record(path)
     assert cycle.n_samples == n
     assert cycle.period == pytest.approx(1e-4)
+
+
+def test_a_ratio_needs_no_unit(tmp_path):
+    path = tmp_path / "servo.csv"
+    path.write_text("t [s],duty,theta_m [rad]\n0,0.1,0\n0.001,0.2,0.1\n0.002,0.1,0.2\n", encoding="utf-8")
+    (cycle,) = read_record(path).cycles
+    assert cycle["duty"].tolist() == [0.1, 0.2, 0.1]
