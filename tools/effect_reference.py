@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def _lines(effects: list[Effect]) -> Iterator[str]:
     yield "What `ema discrepancy` can name, and what a plant file may hold under `effects:` ([another plant](axis.md),"
     yield "[the actuator](discrepancy.md)). At the value in *off* a plant is as without the effect. What lies beyond"
     yield "*searched* may be written into a plant file, but is not looked for. `ema discrepancy --explain NAME` tells"
-    yield "of one of them why it is not the answer."
+    yield "of one of them why it is not the answer. An indented line is what is simulated, as its file says it."
     for effect in effects:
         yield ""
         yield f"## {effect.name}"
@@ -42,11 +42,19 @@ def _lines(effects: list[Effect]) -> Iterator[str]:
         if effect.is_table:
             yield "A table of values, of no known cause."
             continue
+        for law in dict.fromkeys(_law(law) for law in effect.laws.values() if law.__doc__):
+            yield ""
+            yield f"    {law}"
         yield ""
         yield "| parameter | unit | off | searched | meaning |"
         yield "|---|---|---|---|---|"
         for p in effect.parameters:
             yield f"| {p.name} | {p.unit} | {p.neutral:g} | {p.low:g} … {p.high:g} | {p.meaning} |"
+
+
+def _law(law: Callable[..., object]) -> str:
+    """The equation that is simulated, and its sign."""
+    return " ".join((law.__doc__ or "").split("\n\n")[0].split())
 
 
 def main() -> None:
