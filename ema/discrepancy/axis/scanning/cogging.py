@@ -12,6 +12,7 @@ from scipy import stats
 from ema.core.records import Array
 from ema.discrepancy.axis.naming.naming import line
 from ema.discrepancy.plant import Candidate, Free, Point
+from ema.effects.resolver_error import EFFECT as RESOLVER_ERROR
 
 from .weak_form import FEWEST, Weak, weak_form
 
@@ -22,6 +23,8 @@ MAX_ORDER = 240
 MAX_LINES = 8
 MIN_LINE = 0.03  # of the strongest line: weaker ones are not worth a name
 ALARM = 1e-4  # of a line that is not there, over all orders
+PER_TURN = (1.0, 2.0)  # times that an angle's error comes per turn
+LARGEST_ERROR = max(p.high for p in RESOLVER_ERROR.parameters if p.unit == "rad")
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,19 @@ def integer_orders(weak: Weak) -> Array:
     return np.arange(lowest, MAX_ORDER + 1, dtype=float)
 
 
+def _may_be_made_by_angle(found: Scan, k: int) -> bool:
+    """Whether an angle that errs once or twice per turn may make a line of a stronger one beside it.
+
+    sin(n (θ + e cos mθ)) has lines n ± m of n e / 2 (phase modulation). Such a line waits for a round of its own, in
+    which an angle that errs is tried beside it.
+    """
+    size = np.hypot(*found.parts.T)
+    return any(
+        abs(found.orders[k] - n) in PER_TURN and size[k] < size[other] * min(n * LARGEST_ERROR / 2.0, 1.0)
+        for other, n in enumerate(found.orders)
+    )
+
+
 def cogging_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Candidate | None:
     """Lines of integer order that stand out of the torque residual, or None."""
     if plant.plant.is_linear:
@@ -102,6 +118,7 @@ def cogging_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> C
     known = [v for name, v in point.items() if name.startswith("cogging:")]
     size = float(np.abs(np.concatenate([found.parts.ravel(), known, [0.0]])).max())
     strong = [k for k, parts in enumerate(found.parts) if np.hypot(*parts) > MIN_LINE * size]
+    strong = [k for k in strong if not _may_be_made_by_angle(found, k)]
     if not strong:
         return None
     found = Scan(tuple(found.orders[k] for k in strong), found.parts[strong], found.inertia)
