@@ -40,6 +40,12 @@ def explain_cause(findings: Mapping[str, Any], cause: str) -> str:
                 f"{cause} is not ruled out: these records cannot tell it from {effect['name']}; "
                 f"told apart by {effect['separated_by']}."
             )
+    moved = findings.get("moved", {})
+    if cause in moved.get("alike", ()):
+        return (
+            f"{cause} is not ruled out: on these records it would look the same as what was fitted in its place "
+            f"({moved['said']}); told apart by {registry()[cause].separated_by}."
+        )
     tried = [row for row in findings.get("rejected", []) if cause in str(row["name"]).split(" + ")]
     if tried:
         best = tried[0]

@@ -163,6 +163,9 @@ class Findings:
         Of the simulations that the answer rests on, where there are any.
     balance : dict
         What a regression of the balance of torque along the measured motion explains, where the plant has one.
+    moved : dict
+        What was fitted away from the plant file though it is no effect: ``said``, in words, and the effects that would
+        look the same on these records (``alike``). Empty where nothing was.
     leading : list of dict
         Of a search that was interrupted the sets that led: ``effects``, what they leave of held-out parts over noise
         (``left``), ``parameters``, and what was ``fitted`` beside them.
@@ -183,6 +186,7 @@ class Findings:
     next_recording: dict[str, Any] = field(default_factory=dict)
     seeds: dict[str, int] = field(default_factory=dict)
     balance: dict[str, Any] = field(default_factory=dict)
+    moved: dict[str, Any] = field(default_factory=dict)
     leading: list[dict[str, Any]] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
@@ -220,6 +224,7 @@ class Findings:
             "version": version(),
             "seeds": self.seeds,
             **({"balance": self.balance} if self.balance else {}),
+            **({"moved": self.moved} if self.moved else {}),
         }
 
     def write(self, path: Path) -> None:
@@ -231,12 +236,14 @@ class Findings:
         if self.verdict == "unfinished":
             return [_led(self.leading)]
         if self.verdict == "adequate":
+            provided = f", where {self.moved['said']}" if self.moved else ""
             if not self.rest:
-                return ["The simulation agrees with the measurement: what is left is noise.", *self._not_ruled_out()]
+                agrees = f"The simulation agrees with the measurement{provided}: what is left is noise."
+                return [agrees, *self._not_ruled_out()]
             left = f"What is left is small, {self.rest:.3g} times the noise, but it is not noise"
             if self.rest <= 1.0:
                 left = "What is left is no larger than noise, but has a structure that noise has not"
-            return [left + ("; its structure: " + describe(self.structure) if self.structure else "") + "."]
+            return [left + provided + ("; its structure: " + describe(self.structure) if self.structure else "") + "."]
         said = []
         told: set[str] = set()  # experiments: each is told in full once
         for effect in self.effects:

@@ -55,3 +55,12 @@ def test_without_records_there_must_be_something_to_explain(tmp_path):
     run = CliRunner().invoke(discrepancy, ["--out", str(tmp_path)])
     assert run.exit_code == 2
     assert "RECORD... and --plant are needed" in run.output
+
+
+def test_what_would_look_the_same_as_what_was_fitted_is_not_ruled_out():
+    moved = {"said": "dry friction was fitted as 0.03 N m, the plant file says 0.01", "alike": ["inverter_drop"]}
+    findings = Findings("adequate", [], GAIN, moved=moved)
+    (agrees,) = findings.sentences()
+    assert moved["said"] in agrees
+    assert "inverter_drop is not ruled out" in explain_cause(findings.as_dict(), "inverter_drop")
+    assert "is noise" in explain_cause(findings.as_dict(), "cogging")

@@ -91,7 +91,8 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
     found = add_external(plant, found)
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
     notes += [f"implausible: {text}" for text in find_implausible(plant, outcome)]
-    notes += _moved(plant, outcome) if rules is None else []
+    moved = _moved(plant, outcome) if rules is None else {}
+    notes += [_say_moved(moved)] if moved else []
     notes += _kinds(plant) + list(ripple.describe(plant)) + _zeros(plant, outcome)
     return shared.Findings(
         verdict,
@@ -106,6 +107,7 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         rejected=_rejected(plant, outcome, {name for e in found for name in (e.name, *e.indistinguishable_from)}),
         posterior=outcome.posterior if by_runs else [],
         balance=said,
+        moved=moved,
     )
 
 
@@ -146,18 +148,22 @@ def _by_balance(plant: AxisPlant, b: Balance) -> dict[str, Any]:
     return {name: float(f"{own[name]:.6g}") for name in kept if name in own}
 
 
-def _moved(plant: AxisPlant, outcome: Outcome) -> list[str]:
-    """Friction that was fitted away from the plant file's, and what it may stand for."""
+def _moved(plant: AxisPlant, outcome: Outcome) -> dict[str, Any]:
+    """Friction that was fitted away from the plant file's, and what it may stand for (`Findings.moved`)."""
     before, after, error = plant.plant.F_d, outcome.point["F_d"], outcome.k_error[outcome.base.index("F_d")]
     if abs(after - before) < max(3.0 * error, MOVED * before):
-        return []
+        return {}
     unit = "N" if plant.plant.is_linear else "N m"
-    text = f"dry friction was fitted as {after:.3g} {unit}, the plant file says {before:.3g}"
-    if outcome.mimicked:
-        how = dict.fromkeys(registry()[name].separated_by for name in outcome.mimicked)
-        others = " or ".join(outcome.mimicked)
-        text += f"; on these records {others} would look the same, to be told apart by {'; '.join(how)}"
-    return [text]
+    said = f"dry friction was fitted as {after:.3g} {unit}, the plant file says {before:.3g}"
+    return {"said": said, "alike": list(outcome.mimicked)}
+
+
+def _say_moved(moved: dict[str, Any]) -> str:
+    if not moved["alike"]:
+        return str(moved["said"])
+    how = dict.fromkeys(registry()[name].separated_by for name in moved["alike"])
+    others = " or ".join(moved["alike"])
+    return f"{moved['said']}; on these records {others} would look the same, to be told apart by {'; '.join(how)}"
 
 
 def _effect(e: dict[str, Any]) -> shared.FoundEffect:
