@@ -117,8 +117,8 @@ class Folds:
         before, after, gain, error = (_short(scale * x) for x in numbers)
         how = "falls" if self.gain >= 0.0 else "grows"
         return (
-            f"Held out one by one, the error of {len(self.names)} parts {how} from {before} to {after} {unit}, by {gain} "
-            f"± {error}; what is left is {self.told_rest} times what noise makes of it."
+            f"Held out one by one, the error of {len(self.names)} parts {how} from {before} to {after} {unit}, "
+            f"by {gain} ± {error}; what is left is {self.told_rest} times what noise makes of it."
         )
 
     def as_dict(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""An angle that errs once per turn gives a line of cogging two smaller ones beside it: they are no lines of the motor."""
+"""An angle that errs once per turn gives a line of cogging two smaller ones beside it, which the motor has not."""
 
 from __future__ import annotations
 

@@ -123,8 +123,8 @@ class Rereading:
 def _is_no_worse(taken: Tried, further: Tried) -> bool:
     """Whether records taken another way foretell as much as with a further effect.
 
-    A drive that is held is half a sample late, and what delays it or a sensor has a parameter to fit besides: it must be
-    clearly better.
+    A drive that is held is half a sample late, and what delays it or a sensor has a parameter to fit besides: that must
+    be clearly better.
     """
     gain = compare(further, taken)
     is_late = any(f.name in OF_DRIVE or f.name in DELAYS for f in further.accepted[-1].free)

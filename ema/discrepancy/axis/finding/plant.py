@@ -133,7 +133,7 @@ class AxisPlant:
         return self._map(lambda point: self.whitened(point, blocks), points)
 
     def made_by_noise(self, point: Point, blocks: Sequence[int], residuals: Sequence[Array]) -> list[Array]:
-        """Squares that the noise of the recorded drive adds to the `residuals` at a point, shape (n_times,) by block."""
+        """Squares that noise of the recorded drive adds to the `residuals` at a point, shape (n_times,) by block."""
         self._noisier.between = self.between
         again = self._noisier.whitened(point, blocks)
         return [np.sum(np.clip(b - a, -HUBER, HUBER) ** 2, axis=0) for a, b in zip(residuals, again, strict=True)]
