@@ -89,6 +89,8 @@ def findings(plant: AxisPlant, outcome: Outcome) -> shared.Findings:
         verdict = grade(outcome.left, named=True) if by_balance is not None else outcome.verdict
     by_runs = rules is None and by_balance is None
     found = add_external(plant, found)
+    if by_runs and "free_run" in said:
+        said["free_run"]["answer"] = outcome.folds.err_after
     notes += sentences(said) if said else ["no stretch of motion is long enough for a regression on the balance"]
     notes += [f"implausible: {text}" for text in find_implausible(plant, outcome)]
     moved = _moved(plant, outcome) if rules is None else {}

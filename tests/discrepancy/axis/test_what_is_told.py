@@ -18,6 +18,7 @@ from ema.discrepancy.axis.balance.records.of_records import plain_of
 from ema.discrepancy.axis.balance.records.widths import half_widths
 from ema.discrepancy.axis.balance.regressing.agreement import agreements
 from ema.discrepancy.axis.balance.regressing.regression import regress
+from ema.discrepancy.axis.balance.telling.telling import sentences
 from ema.discrepancy.axis.balance.telling.telling_records import by_record
 from ema.discrepancy.axis.finding.describe import effects
 from ema.discrepancy.axis.naming.naming import line
@@ -189,3 +190,20 @@ def test_a_report_of_an_axis_shows_each_record_and_what_the_model_lacks():
     assert all(p.png.startswith(b"\x89PNG") for p in shown)
     same = pictures(plant, SimpleNamespace(base=["F_d"], k_before=[on_paper.F_D], point={"F_d": on_paper.F_D}))
     assert same[0].png != shown[0].png  # before is drawn, too
+
+
+@pytest.mark.parametrize(("err", "says_little"), [(0.6, True), (0.012, False)])
+def test_a_balance_by_which_free_runs_go_wrong_says_so_before_its_numbers(err, says_little):
+    drag = {"value": -6e-4, "low": -7e-4, "high": -5e-4, "unit": "N m s/rad", "implausible": "drag cannot be negative"}
+    of = {
+        "unit": "N m",
+        "explained": {"fitted": 0.999, "with_laws": 0.999},
+        "base": {"viscous_drag": drag},
+        "terms": [],
+        "left_rms": 1e-3,
+        "noise_rms": 1e-3,
+        "free_run": {"err": err, "noise_floor": 0.001, "answer": 0.01},
+    }
+    said = sentences(of)
+    assert said[0].startswith("The balance says little here: free runs with its numbers miss 60.00%") == says_little
+    assert any("cannot be negative" in text for text in said) != says_little

@@ -17,6 +17,7 @@ from ema.discrepancy.axis.naming.linear import in_metres
 from .telling_records import OF_BASE, SAID, by_record, quantities, quantity, short
 
 SURE, CONTRADICTED = 0.9, 0.1
+WORSE = 2.0  # times the error of the answer, from which numbers are not those of the axis
 MADE_BY = {  # what makes a fitted value implausible
     "inertia": "a drive's torque that is late, or a gain of it that is wrong",
     "dry_friction": "drag in its place (one speed does not tell them apart), or a load that follows the motion",
@@ -112,7 +113,14 @@ def sentences(balance: dict[str, Any]) -> list[str]:
         out[0] += (
             f" {share:.0%} of it, where the axis creeps, is left out: friction acts otherwise there than in sliding."
         )
-    if run := balance.get("free_run"):
+    run = balance.get("free_run")
+    is_worse = bool(run) and run["err"] > WORSE * run.get("answer", np.inf)
+    if run and is_worse:
+        out[0] = (
+            f"The balance says little here: free runs with its numbers miss {run['err']:.2%}, those of the answer "
+            f"{run['answer']:.2%}. {out[0]}"
+        )
+    elif run:
         out[0] += f" Free runs with these numbers miss {run['err']:.2%} ({run['noise_floor']:.2%} is noise)."
     if loop := balance.get("closed_loop"):
         runs = " and ".join(f"the {name} {q['before']:.1%} before, {q['after']:.1%} after" for name, q in loop.items())
@@ -120,6 +128,7 @@ def sentences(balance: dict[str, Any]) -> list[str]:
     if records := balance.get("by_record"):
         out.append("Records beside each other: " + "; ".join(own["sentence"] for own in records) + ".")
     implausible = [q["implausible"] for q in (*balance["base"].values(), *balance["terms"]) if "implausible" in q]
+    implausible = [] if is_worse else implausible
     return [*out, *(f"{text[0].upper()}{text[1:]}." for text in implausible)]
 
 
