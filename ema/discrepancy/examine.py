@@ -97,11 +97,11 @@ def examine(
         k_before=[float(before.point[n]) for n in names],
         k_after=[float(final.point[n]) for n in names],
         records=by_record(plant, plain, state.model),
-        model=state.model,
         tried=state.tried,
         mimicked=_mimicked(plant, final) if not chosen else (),
         k_error=tuple(np.sqrt(np.diag(final.covariance))[: len(names)].tolist()),
         point=final.point,
+        model=state.model,
         notes=notes,
         rest=0.0 if is_chance else state.model.rms,
     )

@@ -69,11 +69,11 @@ class Outcome:
     k_before: list[float]
     k_after: list[float]
     records: list[RecordGain]
-    model: Tried
     tried: list[dict[str, Any]]
     mimicked: tuple[str, ...] = ()
     k_error: tuple[float, ...] = ()
     point: Point = field(default_factory=dict)
+    model: Tried = field(default_factory=lambda: Tried((), (), (), ()))
     notes: list[str] = field(default_factory=list)
     rest: float = 0.0
     lost: list[dict[str, Any]] = field(default_factory=list)

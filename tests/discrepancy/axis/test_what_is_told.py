@@ -194,7 +194,8 @@ def test_a_report_of_an_axis_shows_each_record_and_what_the_model_lacks():
 
 @pytest.mark.parametrize(("err", "says_little"), [(0.6, True), (0.012, False)])
 def test_a_balance_by_which_free_runs_go_wrong_says_so_before_its_numbers(err, says_little):
-    drag = {"value": -6e-4, "low": -7e-4, "high": -5e-4, "unit": "N m s/rad", "implausible": "drag cannot be negative"}
+    drag = {"value": -6e-4, "low": -7e-4, "high": -5e-4, "unit": "N m s/rad", "plant_file": 2e-5}
+    drag["implausible"] = "drag cannot be negative"
     of = {
         "unit": "N m",
         "explained": {"fitted": 0.999, "with_laws": 0.999},
