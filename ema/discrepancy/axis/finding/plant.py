@@ -134,18 +134,26 @@ class AxisPlant:
 
     def made_by_noise(self, point: Point, blocks: Sequence[int], residuals: Sequence[Array]) -> list[Array]:
         """Squares that noise of the recorded drive adds to the `residuals` at a point, shape (n_times,) by block."""
-        self._noisier.between = self.between
-        again = self._noisier.whitened(point, blocks)
-        return [np.sum(np.clip(b - a, -HUBER, HUBER) ** 2, axis=0) for a, b in zip(residuals, again, strict=True)]
+        squares: list[list[Array]] = []
+        for other in self._noisier:
+            other.between = self.between
+            again = other.whitened(point, blocks)
+            differences = (np.clip(b - a, -HUBER, HUBER) for a, b in zip(residuals, again, strict=True))
+            squares.append([np.sum(d**2, axis=0) for d in differences])
+        return [np.asarray(np.mean(of, axis=0)) for of in zip(*squares, strict=True)]
 
     @cached_property
-    def _noisier(self) -> AxisPlant:
-        """The same with a further draw of the drive's noise, where it shows any."""
-        other = copy(self)
-        benches = (b if b.static or b.noise[b.roles.drive].is_bound else add_noise(b) for b in self.benches)
-        other._take([*benches])
-        other.filters = self.filters
-        return other
+    def _noisier(self) -> tuple[AxisPlant, ...]:
+        """The same with more of the drive's noise, where it shows any: with less than there was, and with more."""
+        is_quiet = [b.static or b.noise[b.roles.drive].is_bound for b in self.benches]
+        others = []
+        for anew in (False, True):
+            other = copy(self)
+            pairs = zip(self.benches, is_quiet, strict=True)
+            other._take([b if quiet else add_noise(b, anew=anew) for b, quiet in pairs])
+            other.filters = self.filters
+            others.append(other)
+        return tuple(others)
 
     def candidates(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Library effects with bounds and starts for this axis."""
