@@ -32,7 +32,7 @@ def tried(plant, **effects):
 def test_what_is_added_is_what_smoothing_leaves_of_noise(plant):
     (bench, *_) = plant.benches
     noisier = add_noise(bench, anew=False)
-    for w, other in zip(bench.windows, noisier.windows, strict=True):
+    for other in noisier.windows:
         assert (other.part.drive[other.first : other.first + other.n] == other.drive).all()
     less, more = (
         np.std(np.concatenate([b.drive - a.drive for a, b in zip(bench.windows, other.windows, strict=True)]))

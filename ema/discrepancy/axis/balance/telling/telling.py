@@ -17,7 +17,7 @@ from ema.discrepancy.axis.naming.linear import in_metres
 from .telling_records import OF_BASE, SAID, by_record, quantities, quantity, short
 
 SURE, CONTRADICTED = 0.9, 0.1
-WORSE = 2.0  # times the error of the answer, from which numbers are not those of the axis
+WORSE = 10.0  # times the error of the answer, from which numbers are not those of the axis
 MADE_BY = {  # what makes a fitted value implausible
     "inertia": "a drive's torque that is late, or a gain of it that is wrong",
     "dry_friction": "drag in its place (one speed does not tell them apart), or a load that follows the motion",
@@ -113,9 +113,9 @@ def sentences(balance: dict[str, Any]) -> list[str]:
         out[0] += (
             f" {share:.0%} of it, where the axis creeps, is left out: friction acts otherwise there than in sliding."
         )
-    run = balance.get("free_run")
-    is_worse = bool(run) and run["err"] > WORSE * run.get("answer", np.inf)
-    if run and is_worse:
+    run = balance.get("free_run", {})
+    is_worse = run.get("err", 0.0) > WORSE * run.get("answer", np.inf)
+    if is_worse:
         out[0] = (
             f"The balance says little here: free runs with its numbers miss {run['err']:.2%}, those of the answer "
             f"{run['answer']:.2%}. {out[0]}"
