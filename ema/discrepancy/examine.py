@@ -64,7 +64,7 @@ def examine(
     chosen = list(state.model.accepted)  # where folds suggested different parameters, those of the first fold
     free = [*plant.base, *(f for c in chosen for f in c.free)]
     final = fit(plant, free, state.model.fits[0].point, everything)
-    draw = partial(weighed.draw, trust=trust, model=state.model, final=final)
+    draw = partial(weighed.draw, model=state.model, final=final)
     before = fit(plant, plant.base, plain.fits[0].point, everything)
     terms = [c for c in chosen if c.is_structure]
     outcome = grade(left, named=len(terms) < len(chosen))

@@ -57,13 +57,14 @@ class Weighed:
             if e.probability >= TOLD
         ]
 
-    def draw(self, n: int, trust: Mapping[str, float], model: Tried, final: Fit) -> list[Point]:
+    def draw(self, n: int, model: Tried, final: Fit) -> list[Point]:
         """About `n` points, from every set as many as it is likely: of the `model` by its `final` fit to all records.
 
-        So a size is as uncertain as it is unclear which other effects are there.
+        So a size is as uncertain as it is unclear which other effects are there. Where another stands for something
+        without a name, that is there all the same: sizes are those beside it.
         """
         points: list[Point] = []
-        for entry in self._thinned(trust):
+        for entry in self.entries:
             of = self.sets.get(entry.causes)
             fits = (final,) if entry.causes == _names(model) else of.fits if of else ()
             for fit in fits:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -100,7 +101,11 @@ def test_what_is_there_is_sure_and_alone_where_nothing_looks_like_it():
 
 
 def test_a_size_is_as_uncertain_as_it_is_unclear_what_else_is_there():
-    """A second effect is as likely as not; with it the first is 1, without 3: points come of both sets, half each."""
+    """A second effect is as likely as not; with it the first is 1, without 3: points come of both sets, half each.
+
+    A second one that is needed, and may stand for something without a name, leaves the first as it is beside it: a
+    spring of 90 N/m was told as 18 to 91.
+    """
     frees = {n: Free(n, "1", -5.0, 5.0, 1.0, 0.1) for n in ("one", "other")}
     candidates = {n: Candidate(n, n, (f,), ({n: 1.0},)) for n, f in frees.items()}
 
@@ -110,13 +115,14 @@ def test_a_size_is_as_uncertain_as_it_is_unclear_what_else_is_there():
         return Tried(tuple(candidates[n] for n in names), (fit, fit), (), ())
 
     sets = {ONE: of(3.0, "one"), ("one", "other"): of(1.0, "one", "other")}
-    entries = [Entry(("one", "other"), 1.0, 0.0, 0.0)]
+    both, alone = Entry(("one", "other"), 0.5, 0.0, 0.0), Entry(("one",), 0.5, 0.0, 0.0)
     model = sets[ONE]
-    drawn = Weighed(entries, sets, {}, {}).draw(1000, {"other": 0.5}, model, model.fits[0])
-    sizes = np.array([p["one"] for p in drawn])
+    sizes = np.array([p["one"] for p in Weighed([both, alone], sets, {}, {}).draw(1000, model, model.fits[0])])
     assert len(sizes) == pytest.approx(1000, abs=2)
     assert np.mean(np.isclose(sizes, 3.0, atol=0.1)) == pytest.approx(0.5, abs=0.01)
     assert np.mean(np.isclose(sizes, 1.0, atol=0.1)) == pytest.approx(0.5, abs=0.01)
+    needed = Weighed([replace(both, probability=1.0)], sets, {}, {}).draw(1000, model, model.fits[0])
+    assert np.allclose([p["one"] for p in needed], 1.0, atol=0.1)
 
 
 def test_what_may_stand_for_something_unknown_takes_its_share_of_every_set():
