@@ -96,6 +96,17 @@ def test_several_cogging_lines_add_up_in_the_holding_current():
         np.testing.assert_allclose(held * 0.05, torque + direction * 0.004, atol=1e-9)
 
 
+def test_a_line_is_held_where_the_angle_is_and_not_where_it_is_measured():
+    """A resolver that errs once per turn modulates the phase of a map's line."""
+    error = {"once_cosine": 0.01, "once_sine": 0.0, "twice_cosine": 0.0, "twice_sine": 0.0}
+    plant = FREE.model_copy(update={"F_d": 0.004, "F_s": 0.004})
+    line = {"amplitude": 0.01, "order": 18.0, "phase": 0.3}
+    true = np.linspace(0.0, 2.0 * np.pi, 500)
+    numbers = axis.model(plant, {"cogging": line, "resolver_error": error})
+    held = axis.holding(numbers, true + 0.01 * np.cos(true), np.ones(500), true)
+    np.testing.assert_allclose(held * 0.05, 0.01 * np.sin(18 * true + 0.3) + 0.004, atol=1e-6)
+
+
 def test_halving_the_step_changes_nothing_that_counts():
     i = 0.4 * np.sin(12.0 * T)
     plant = FREE.model_copy(update={"F_d": 0.003, "F_s": 0.003})
