@@ -153,7 +153,7 @@ def acting_drive(lag: float, t: Array, recorded: Array, between: str = "straight
 
 
 def holding(numbers: Model, theta: Array, direction: Array, t: Array, load: Array | None = None) -> Array:
-    """Current that holds the axis with a known `load` at measured `theta`, approached in `direction`; of one shape. [A]"""
+    """Current that holds the axis with a `load` at measured `theta`, approached in `direction`; of one shape. [A]"""
     out = np.empty(len(theta))
     true = true_state(numbers, np.stack([theta, np.zeros(len(theta))], axis=1), derived=False)[:, 0].copy()
     kernel.holding_current(numbers.z, numbers.lines, numbers.terms, true, direction, t, _known(load, t), out)
