@@ -121,9 +121,9 @@ class Gain:
     @property
     def is_rest_sure(self) -> bool:
         """Whether more than noise is left by more than parts scatter."""
-        if self.folds is None or len(self.folds.names) < 2 or self.rest > self._rest_of_error:
+        if self.folds is None or self.rest > self._rest_of_error:
             return True
-        return self.rest * float(np.exp(-UPPER * self.folds.relative_rest_error)) > 1.0
+        return self.folds.least_rest(UPPER) > 1.0
 
     @property
     def _rest_of_error(self) -> float:

@@ -76,6 +76,11 @@ class Folds:
         after, floor = np.array(self.after), np.array(self.floor)
         return self._jackknife(lambda w: float(np.log(max(_rms(after, w), 1e-300) / max(_rms(floor, w), 1e-300))))
 
+    def least_rest(self, deviations: float) -> float:
+        """`rest` less so many standard errors of its logarithm; of one part itself."""
+        scatter = self.relative_rest_error if len(self.names) > 1 else 0.0
+        return self.rest * float(np.exp(-deviations * scatter))
+
     @property
     def event(self) -> tuple[str, float, float] | None:
         """The one part that leaves far more than all others, with what it and the most of these leave; else None.

@@ -26,8 +26,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
 if TYPE_CHECKING:
     from .folds import Folds
 
@@ -76,8 +74,7 @@ class Left:
         far more than all others is sure. The error in the plant's own unit is not: of free runs one part may make most
         of it.
         """
-        scatter = self.error.relative_rest_error if len(self.error.names) > 1 else 0.0
-        error = self.error.rest * np.exp(-UPPER * scatter)
+        error = self.error.least_rest(UPPER)
         return bool(self.residual.rest > self.allowed or error > self.allowed or self.residual.event is not None)
 
     @property

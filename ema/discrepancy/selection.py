@@ -165,6 +165,13 @@ def fit_model(
     return Tried(tuple(models[0]), tuple(fits), tuple(tuple(m) for m in models), ordered, noise)
 
 
+def try_at(plant: Plant, point: Point, residuals: Sequence[Array] | None = None) -> Tried:
+    """A model at a point by all blocks, with its `residuals` there if these are known."""
+    blocks = range(len(plant.blocks))
+    residuals = plant.residuals([point], blocks)[0] if residuals is None else residuals
+    return Tried((), (), (), tuple(residuals), tuple(plant.made_by_noise(point, blocks, residuals)))
+
+
 def _help_by_other_folds(plant: Plant, own: Fit, fits: Sequence[Fit]) -> Fit:
     """The fit, begun again where another fold ended if that is better here: dry friction has side minima."""
     names = [f.name for f in own.free]

@@ -15,7 +15,7 @@ GROUPS = (1, 8, 64)  # samples averaged before a chi-square: the time scales loo
 N_LAGS = 8
 MIN_PAIRS = 30  # of residuals, for their correlation to be one of many products
 BOUND = 1.0  # relative uncertainty of an amplitude that is known to its order of magnitude
-MOSTLY = 0.5 * BOUND
+MOSTLY = 0.5 * BOUND  # from which a bound is most of what is known of it
 CLIP = 5.0  # a single wild sample is not a cause
 
 

@@ -125,14 +125,14 @@ def count_repeated(record: Record) -> int:
     positions = [names[j] for j in moving if names[j] in POSITIONS]
     for cycle, of in zip(record.cycles, stays, strict=True):
         own, rest = of[least], np.asarray(np.all(of[others], axis=0))
+        changes = [np.abs(np.diff(cycle[name])) for name in positions]
         once = own[1:-1] & ~own[:-2] & ~own[2:]
-        for name in positions:
-            once &= (np.diff(cycle[name])[:-2] != 0.0) & (np.diff(cycle[name])[2:] != 0.0)
+        for change in changes:
+            once &= (change[:-2] > 0.0) & (change[2:] > 0.0)
         repeats = once & rest[1:-1]
         n += int(repeats.sum())
-        for name in positions:
-            change = np.abs(np.diff(cycle[name]))
-            before, after = before + change[:-2][repeats].sum(), after + change[2:][repeats].sum()
+        before += sum(float(change[:-2][repeats].sum()) for change in changes)
+        after += sum(float(change[2:][repeats].sum()) for change in changes)
         alone += int(once.sum())
         together += int((rest & ~own).sum())
         free += int((~own).sum())

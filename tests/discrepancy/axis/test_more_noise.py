@@ -9,7 +9,7 @@ import pytest
 
 from ema.discrepancy.axis.finding.plant import AxisPlant
 from ema.discrepancy.axis.reading.noisier import add_noise
-from ema.discrepancy.selection import Tried, compare
+from ema.discrepancy.selection import compare, try_at
 from ema.models.axis_config import RotaryAxis
 
 
@@ -23,10 +23,7 @@ def plant(support):
 
 
 def tried(plant, **effects):
-    point = {**{f.name: f.start for f in plant.base}, **effects}
-    blocks = range(len(plant.blocks))
-    residuals = plant.residuals([point], blocks)[0]
-    return Tried((), (), (), tuple(residuals), tuple(plant.made_by_noise(point, blocks, residuals)))
+    return try_at(plant, {**{f.name: f.start for f in plant.base}, **effects})
 
 
 def test_what_is_added_is_what_smoothing_leaves_of_noise(plant):

@@ -22,7 +22,7 @@ from ema.discrepancy.outcome import Outcome
 from ema.discrepancy.plant import Free, Point
 from ema.discrepancy.progress import Progress
 from ema.discrepancy.rounds import judge_model
-from ema.discrepancy.selection import ODDS, Tried, above_noise, compare, fit_base, refit
+from ema.discrepancy.selection import ODDS, Tried, above_noise, compare, fit_base, refit, try_at
 
 from .plant import AxisPlant
 
@@ -207,9 +207,10 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     def taken(way: str) -> Tried:
         plant.between = way
         less = (LATE[way] - LATE[here]) * period
-        found = [_tried(plant, _shorten_delays(outcome.point, less))]
+        found = [try_at(plant, _shorten_delays(outcome.point, less))]
         if way != here and OF_DRIVE.keys() & outcome.point.keys():
-            found.append(_tried(plant, _with_constant_delay(plant, outcome.point, less).point))
+            late = _with_constant_delay(plant, outcome.point, less)
+            found.append(try_at(plant, late.point, late.residuals))
         return max(found, key=lambda own: compare(own, found[0]).gain)
 
     ways = {way: taken(way) for way in LATE}
@@ -223,13 +224,6 @@ def _beside(plant: AxisPlant, outcome: Outcome) -> str:
     later = sum(outcome.point.get(name, 0.0) for name in OF_DRIVE) / period
     by_drive = [way for way in LATE if way != "straight" and abs(later - LATE[way]) < NEARLY_HALF]
     return ("held" if by_half else next(iter(by_drive), here)) if here == "straight" else here
-
-
-def _tried(plant: AxisPlant, point: Point) -> Tried:
-    """A model at a point, by all blocks."""
-    blocks = range(len(plant.blocks))
-    residuals = plant.residuals([point], blocks)[0]
-    return Tried((), (), (), tuple(residuals), tuple(plant.made_by_noise(point, blocks, residuals)))
 
 
 def _with_constant_delay(plant: AxisPlant, point: Point, less: float) -> Fit:
@@ -266,7 +260,7 @@ def _widen_by_ways(plant: AxisPlant, outcome: Outcome, name: str, told: list[dic
         plant.between = way
         point = _shorten_delays(outcome.point, (LATE[way] - LATE[here]) * period)
         fits[way] = _fit_delay(plant, name, point)
-        tried[way] = _tried(plant, fits[way].point)
+        tried[way] = try_at(plant, fits[way].point, fits[way].residuals)
     plant.between = here
     for way, f in fits.items():
         if not compare(tried[here], tried[way]).is_clear:

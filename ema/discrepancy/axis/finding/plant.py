@@ -29,6 +29,7 @@ from ema.discrepancy.axis.scanning.zeros import zeros
 from ema.discrepancy.axis.simulating.noise_model import measure_bounded, position_noise, whitener, without_start
 from ema.discrepancy.axis.simulating.pack import Pack
 from ema.discrepancy.axis.simulating.predictable import LONGEST_WINDOW, predictable_time
+from ema.discrepancy.axis.simulating.whitening import Filter
 from ema.discrepancy.fitting import HUBER
 from ema.discrepancy.plant import Block, Candidate, Errors, Fitted, Free, Point
 from ema.discrepancy.verdict import BOUND, GROUPS
@@ -86,12 +87,12 @@ class AxisPlant:
             self._balances[self.between] = balance(self)
         return self._balances[self.between]
 
-    def _take(self, benches: Sequence[Bench]) -> None:
+    def _take(self, benches: Sequence[Bench], filters: list[Filter | None] | None = None) -> None:
         self.benches = tuple(benches)
         self.windows: tuple[Window, ...] = tuple(w for b in benches for w in b.windows)
         self._bench_of = [b for b in benches for _ in b.windows]
         pairs = zip(self._bench_of, self.windows, strict=True)
-        self.filters = [None if w.static else whitener(self.plant, b, w) for b, w in pairs]
+        self.filters = filters or [None if w.static else whitener(self.plant, b, w) for b, w in pairs]
         self._packs: dict[tuple[int, ...], list[Pack]] = {}
 
     # ---- the engine's view -------------------------------------------------------------------------------------
@@ -145,13 +146,12 @@ class AxisPlant:
     @cached_property
     def _noisier(self) -> tuple[AxisPlant, ...]:
         """The same with more of the drive's noise, where it shows any: with less than there was, and with more."""
-        is_quiet = [b.static or b.noise[b.roles.drive].is_bound for b in self.benches]
+        noisy = [not b.static and not b.noise[b.roles.drive].is_bound for b in self.benches]
         others = []
-        for anew in (False, True):
+        for anew in (False, True) if any(noisy) else ():
             other = copy(self)
-            pairs = zip(self.benches, is_quiet, strict=True)
-            other._take([b if quiet else add_noise(b, anew=anew) for b, quiet in pairs])
-            other.filters = self.filters
+            pairs = zip(self.benches, noisy, strict=True)
+            other._take([add_noise(b, anew=anew) if is_noisy else b for b, is_noisy in pairs], self.filters)
             others.append(other)
         return tuple(others)
 

@@ -57,13 +57,14 @@ def whitener(p: Axis, b: Bench, w: Window) -> Filter:
 
 
 def measure_bounded(p: Axis, b: Bench, w: Window, groups: Sequence[int]) -> Array:
-    """Share of the variance of a window's residual, averaged over so many samples, that only a bound is known of.
+    """Share of the variance of a window's residual, averaged over so many samples, that its outputs make.
 
-    Made by outputs without noise of their own (all of it where the drive has none either). Noise of a drive is
-    integrated: where it is slow, it makes nearly all of a residual, however little is known of the output's.
+    Of outputs without noise of their own: only a bound is known of that share, and of all where the drive has none
+    either. Noise of a drive is integrated: where it is slow, it makes nearly all of a residual, however little is known
+    of the outputs'.
     """
-    if b.noise[b.roles.drive].is_bound or not all(b.noise[name].is_bound for name in b.roles.outputs):
-        return np.full(len(groups), float(b.noise[b.roles.drive].is_bound))
+    if b.noise[b.roles.drive].is_bound:
+        return np.ones(len(groups))
     of_outputs = noise_model(p, b, w).noise * np.random.default_rng(0).standard_normal((N_DRAWN, *np.shape(w.outputs)))
     made = np.concatenate([whitener(p, b, w).whiten(x) for x in of_outputs])
     return np.array([np.mean(average(made, min(g, w.n)) ** 2) for g in groups])

@@ -128,8 +128,7 @@ def sentences(balance: dict[str, Any]) -> list[str]:
     if records := balance.get("by_record"):
         out.append("Records beside each other: " + "; ".join(own["sentence"] for own in records) + ".")
     implausible = [q["implausible"] for q in (*balance["base"].values(), *balance["terms"]) if "implausible" in q]
-    implausible = [] if is_worse else implausible
-    return [*out, *(f"{text[0].upper()}{text[1:]}." for text in implausible)]
+    return [*out, *(f"{text[0].upper()}{text[1:]}." for text in implausible if not is_worse)]
 
 
 def _close(share: float) -> str:
