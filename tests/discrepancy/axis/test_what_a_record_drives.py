@@ -84,6 +84,8 @@ def test_a_current_that_is_off_is_none_and_of_a_voltage_that_is_off_nothing_is_k
     off = only(CURRENT, record(enabled=on))
     assert (off["i_q"][1000:1500] == 0.0).all()
     assert np.array_equal(off["i_q"][:1000], swing["i_q"][:1000])
+    offset = np.where(on > 0.5, swing["i_q"], 0.02) + 0.01 * np.random.default_rng(1).standard_normal(len(on))
+    assert np.array_equal(only(CURRENT, record(i_q=offset, enabled=on))["i_q"], offset)  # what its sensor shows of none
     (parts,) = (r.cycles for r in take_in(VOLTAGE, [record(u_q=np.cos(swing["t"]), enabled=on)]))
     assert [c.n_samples for c in parts] == [1000, len(on) - 1500]
     assert len({c.number for c in parts}) == 2

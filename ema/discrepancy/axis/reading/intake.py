@@ -5,7 +5,8 @@ torque beyond a gear                times or by its ratio, to where position and
 known load on the user's side       over the gear's ratio where position is measured at the motor
 duty                                times the supply: the voltage
 reference of a position loop        with the drive's gains and the measured motion: what the drive asks for
-enabled                             a current or torque that is off is 0; of a voltage that is off nothing is known
+enabled                             a current or torque that is off is 0, and one that was measured what its sensor
+                                    shows of that; of a voltage that is off nothing is known
 ==================================  ==============================================================================
 """
 
@@ -15,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ema.core.errors import RecordError
 from ema.core.records import Array, Cycle, Record
@@ -25,6 +27,7 @@ from .smooth import local_polynomial
 
 GIVEN = {"current": "i_q", "voltage": "u_q", "torque": "torque", "force": "force", "duty": "duty"}
 SHORTEST = 40  # samples of a part with the drive on
+WANDERS = 2.0  # times its noise, by which a reading strays that does not stay where it is
 SMOOTH = 3  # samples to each side, over which the speed is taken
 
 
@@ -83,9 +86,21 @@ def _supply(plant: Axis, channels: dict[str, Array], name: str) -> Array | float
     return plant.V_dc
 
 
+def _is_measured(drive: Array, on: NDArray[np.bool_]) -> bool:
+    """Whether what was recorded of a drive that is off is its sensor's offset and noise, and not what was asked for."""
+    off = drive[~on]
+    if len(off) < SHORTEST:
+        return False
+    strays = float(np.median(np.abs(off - np.median(off))))
+    noise = float(np.median(np.abs(np.diff(off)))) / np.sqrt(2.0)
+    return 0.0 < strays < WANDERS * noise
+
+
 def _enabled(plant: Axis, cycle: Cycle, drive: str) -> list[Cycle]:
     on = cycle["enabled"] > 0.5
     if drive != "u_q":
+        if _is_measured(cycle[drive], on):
+            return [cycle]
         return [replace(cycle, channels={**cycle.channels, drive: np.where(on, cycle[drive], 0.0)})]
     parts = [cycle.rows(a, b) for a, b in find_runs(on).tolist() if b - a >= SHORTEST]
     return [replace(part, number=100 * cycle.number + k) for k, part in enumerate(parts)] if len(parts) > 1 else parts

@@ -11,6 +11,8 @@ from scipy.optimize import nnls
 
 from ema.core.records import Array, Cycle
 
+DRIVES = ("i_q", "torque", "force", "u_q", "duty")  # may be commands
+LEVELS = 5  # values up to which a channel goes between levels
 N_BINS = 8
 MAX_SAMPLES = 4000  # of a cycle, to see how a channel was made
 MIN_STEPS = 20  # steps of few counts from which a lattice can be told
@@ -87,6 +89,11 @@ def quantum(x: Array) -> float:
     return step
 
 
+def is_levelled(name: str, x: Array) -> bool:
+    """Whether a channel that drives goes between a few levels: a command, which is exact, and no coarse reading."""
+    return name in DRIVES and len(np.unique(x)) <= LEVELS
+
+
 def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None, size: float = 0.0) -> Noise:
     """Estimate from a channel's cycles: robust, rather too large than too small (fast motion counts as noise).
 
@@ -94,6 +101,8 @@ def estimate(cycles: tuple[Cycle, ...], name: str, resolution: float | None, siz
     expected to be better than.
     """
     everything = np.concatenate([cycle[name] for cycle in cycles])
+    if is_levelled(name, everything):
+        return _bounded(1e-12, 0.0, SIMULATED_TO * size)
     step = resolution or max(quantum(cycle[name]) for cycle in cycles)
     of_steps = step / np.sqrt(12.0)
     floor = max(of_steps, 1e-9 * float(np.std(everything)), 1e-12)
