@@ -55,20 +55,17 @@ def discrepancy(
       ema discrepancy --plant actuator.yaml log --cycles 17,18,20 --out findings
       ema discrepancy --out findings --explain magnet_flux
     """
-    from ema.core import config
     from ema.discrepancy.explaining import explain_cause, read_findings
 
     from .integrity import tell
-    from .plans import plan_of
+    from .plans import kind_of, plan_of
 
     if explain is not None and not records:
         click.echo(explain_cause(read_findings(out), explain))
         return
     if not records or plant_file is None:
         raise click.UsageError("RECORD... and --plant are needed, but with --explain of findings that are there.")
-    kind = config.read_yaml(plant_file).get("kind")
-    if kind not in EXAMINERS:
-        raise ConfigError(f"{plant_file}: key 'kind' = {kind!r}: must be one of {', '.join(EXAMINERS)}")
+    kind = kind_of(plant_file)
     read, empty = _read(records, plan_of(plant_file))
     read = _chosen(read, cycles)
     files = [out / name for name in ("findings.json", "report.html", "extended.yaml")]

@@ -9,7 +9,9 @@ import click
 
 from ema.core.ranges import FiniteRange
 
-_POSITIVE = FiniteRange(min=0, min_open=True)
+
+def _positive(unit: str | None = None) -> FiniteRange:
+    return FiniteRange(min=0, min_open=True, unit=unit)
 
 
 @click.group(short_help="Plant files: begin one from records and a data sheet.")
@@ -27,16 +29,17 @@ def plant() -> None:
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="the plant file; must not exist")
 @click.option("--name", default="bench", show_default=True, help="what to call it")
 @click.option("--pole-pairs", type=click.IntRange(1, 200), help="data sheet")
-@click.option("--gear", type=_POSITIVE, metavar="N", help="turns of the motor for one of the user, N:1")
+@click.option("--gear", type=_positive(), metavar="N", help="turns of the motor for one of the user, N:1")
 @click.option("--torque-at", type=click.Choice(["motor", "load"]), help="side of the gear of the torque sensor")
 @click.option("--measured-at", type=click.Choice(["motor", "load"]), help="side of the gear of position and speed")
-@click.option("--R", "R", type=_POSITIVE, metavar="OHM", help="phase resistance [ohm]")
-@click.option("--L", "L", type=_POSITIVE, metavar="H", help="phase inductance [H]")
-@click.option("--kv", type=_POSITIVE, metavar="RPM/V", help="speed constant, line to line [rpm/V]")
-@click.option("--k-t", "k_t", type=_POSITIVE, metavar="N·m/A", help="torque per amplitude of current [N m/A]")
-@click.option("--supply", "V_dc", type=_POSITIVE, metavar="V", help="supply of which a duty cycle is a share [V]")
+@click.option("--R", "R", type=_positive("ohm"), metavar="OHM", help="phase resistance [ohm]")
+@click.option("--L", "L", type=_positive("H"), metavar="H", help="phase inductance [H], or with its unit: 0.5mH")
+@click.option("--kv", type=_positive("rpm/V"), metavar="RPM/V", help="speed constant, line to line [rpm/V]")
+@click.option("--k-t", "k_t", type=_positive("N m/A"), metavar="N·m/A", help="torque per amplitude of current [N m/A]")
+@click.option("--supply", "V_dc", type=_positive("V"), metavar="V", help="supply of which a duty cycle is a share [V]")
+@click.option("--drive", type=click.Choice(["torque", "force", "i_q", "u_q", "duty"]), help="where several may")
 @click.option("--brushed", is_flag=True, help="a DC motor with brushes: k_e = k_t, not that of one of three phases")
-@click.option("--J", "J", type=_POSITIVE, metavar="KG·M²", help="inertia or mass, where it is known [kg m^2, kg]")
+@click.option("--J", "J", type=_positive(), metavar="KG·M²", help="inertia or mass, where it is known [kg m^2, kg]")
 def init(
     files: tuple[Path, ...], out: Path, name: str, pole_pairs: int | None, gear: float | None, **sheet: Any
 ) -> None:

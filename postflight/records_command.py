@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ema.core.records import Record
 
 PICTURES = (".svg", ".png", ".pdf")
+UNEVEN = 0.02  # by which the mean rate differs from that of most steps and is told too
 SEE_IT = "see it, or move it away"
 
 
@@ -29,17 +30,21 @@ def records() -> None:
 @records.command(short_help="Channels, clock, agreement, and what can be identified.")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
-    "--plant", type=click.Path(path_type=Path), help="plant YAML whose key 'record' says what the columns are"
+    "--plant",
+    type=click.Path(path_type=Path),
+    help="plant YAML: what drives, and in its key 'record' what the columns are",
 )
 @click.option("--picture", type=click.Path(path_type=Path), help="SVG or PNG with every channel over time")
 @click.option("--json", "as_json", is_flag=True, help="Answer for a machine.")
 def check(files: tuple[Path, ...], plant: Path | None, picture: Path | None, as_json: bool) -> None:
     """Say what each FILE has: channels, rate, jitter, gaps, clipping, steps, noise, whether channels agree, and what it
-    can and cannot identify. Exit status 1 if a file is enough for no plant.
+    can and cannot identify. With --plant it is looked at as a record of that plant, and what `ema discrepancy` would
+    refuse is told. Exit status 1 if a file is enough for no plant, or not for the one that is given.
 
     \b
     Examples:
       ema records check flight.csv
+      ema records check bench.csv --plant bench.yaml
       ema records check bench.csv --picture bench.svg --json
     """
     from ema.core.errors import ConfigError, NegativeAnswer
@@ -47,16 +52,17 @@ def check(files: tuple[Path, ...], plant: Path | None, picture: Path | None, as_
     from ema.core.records import each_once, read_record
     from ema.discrepancy.records import agreements, channels, list_allowed, sampling
 
-    from .plans import plan_of
+    from .plans import axis_of, plan_of
 
     if picture is not None and require_new(picture, "choose another --picture").suffix.lower() not in PICTURES:
         raise ConfigError(f"{picture}: must end in .svg, .png or .pdf")
     plan = None if plant is None else plan_of(plant)
+    axis = None if plant is None else axis_of(plant)
     found, answers = [], []
     for path in each_once(files):
         record = read_record(path, plan)
         clock, facts, agree = sampling(record), channels(record), agreements(record)
-        able = list_allowed(record, clock, facts, agree)
+        able = list_allowed(record, clock, facts, agree, axis)
         found.append(record)
         answers.append((record, clock, facts, agree, able))
     if as_json:
@@ -69,9 +75,11 @@ def check(files: tuple[Path, ...], plant: Path | None, picture: Path | None, as_
 
         draw(found, picture)
         click.echo(str(picture), err=as_json)
-    useless = [record.name for record, *_, able in answers if not able.plants]
+    useless = [record.name for record, *_, able in answers if not able.plants or able.refused]
     if useless:
-        raise NegativeAnswer(f"{', '.join(useless)}: enough for no plant")
+        raise NegativeAnswer(
+            f"{', '.join(useless)}: enough for {'no plant' if axis is None else f'no search by {plant}'}"
+        )
 
 
 @records.command("map", short_help="Propose what the columns of a stranger's file are.")
@@ -127,17 +135,18 @@ def _as_dict(record: Record, clock: Any, facts: Any, agree: Any, able: Any) -> d
         "plants": able.plants,
         "missing": able.missing,
         "obstacles": able.obstacles,
+        "refused": able.refused,
     }
 
 
 def _tell(record: Record, clock: Any, facts: Any, agree: Any, able: Any) -> None:
-    rate = f"{1.0 / clock.period:.6g} Hz, jitter {100 * clock.jitter:.1f} % of the period"
-    click.echo(f"{record.name}: {clock.n_cycles} cycles, {clock.n_samples} samples, {clock.duration:.4g} s, {rate}")
+    click.echo(f"{record.name}: {clock.n_cycles} cycles, {_say_clock(record, clock)}")
     click.echo(f"  {'channel':<10} {'unit':<6} {'from':>11} {'to':>11} {'step':>10} {'noise':>10}  remark")
     for one in facts:
         remark = "constant" if one.is_constant else f"{100 * one.held:.1f} % at an end" if one.held else ""
         step = f"{one.step:10.3g}" if one.step else f"{'-':>10}"
-        line = f"  {one.name:<10} {one.unit:<6} {one.low:11.5g} {one.high:11.5g} {step} {one.noise:10.3g}  {remark}"
+        noise = f"{one.noise:10.3g}" if one.noise else f"{'-':>10}"
+        line = f"  {one.name:<10} {one.unit:<6} {one.low:11.5g} {one.high:11.5g} {step} {noise}  {remark}"
         click.echo(line.rstrip())
     if record.ignored:
         click.echo(f"  not understood: {', '.join(record.ignored)}")
@@ -149,3 +158,14 @@ def _tell(record: Record, clock: Any, facts: Any, agree: Any, able: Any) -> None
         click.echo(f"  not as kind: {kind}: {', '.join(what)} missing")
     for obstacle in able.obstacles:
         click.echo(f"  in the way: {obstacle}")
+    if able.refused:
+        click.echo(f"  refused by 'ema discrepancy' with this plant file: {able.refused}")
+
+
+def _say_clock(record: Record, clock: Any) -> str:
+    if record.is_at_rest:
+        return f"{clock.n_samples} readings at rest"
+    rate = 1.0 / clock.period
+    mean = (clock.n_samples - clock.n_cycles) / max(clock.duration, clock.period)
+    told = f"{rate:.6g} Hz" if abs(mean / rate - 1.0) < UNEVEN else f"{rate:.6g} Hz ({mean:.4g} Hz on average)"
+    return f"{clock.n_samples} samples, {clock.duration:.4g} s, {told}, jitter {100 * clock.jitter:.1f} % of the period"

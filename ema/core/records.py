@@ -98,6 +98,12 @@ class Record:
         return tuple(name for name in self.cycles[0].channels if all(name in cycle for cycle in self.cycles))
 
     @property
+    def is_at_rest(self) -> bool:
+        """Whether these are readings at rest, one after the other: its speed is zero throughout."""
+        speeds = [name for name in ("w_m", "v") if name in self.channels]
+        return bool(speeds) and not any(cycle[name].any() for name in speeds for cycle in self.cycles)
+
+    @property
     def n_cycles(self) -> int:
         """Number of cycles."""
         return len(self.cycles)

@@ -42,7 +42,8 @@ def record_of(table: Table, side: sidecar.Sidecar) -> Record:
             f"{path}: missing column 't [s]' (columns: {', '.join(header)}); where it has another title, "
             f"'ema records map {path}' proposes what the columns are"
         )
-    ignored = tuple(name for index, name in enumerate(header) if index not in columns)
+    # what the owner says is to be ignored is understood
+    ignored = tuple(name for index, name in enumerate(header) if index not in columns and name not in side.columns)
     number = channels.pop("cycle", None)
     marks = values[header.index(rule)] if rule else None
     cycles = tuple(_cycles(table, side, channels, number, marks))

@@ -18,6 +18,7 @@ from .units import is_unit
 
 _DELIMITERS = (",", ";", "\t", "|", " ")  # " " stands for any white space
 _COMMENTS = ("#", "%", "//")
+UNTITLED = "column "  # and its number, counted from 1, is the title of a column in a file that has none
 _LOOKED_AT = 50  # rows from which delimiter and decimal sign are read
 
 
@@ -37,6 +38,14 @@ class Dialect(NamedTuple):
         """Value of a field; ValueError where it is none."""
         return float(field if self.decimal == "." else field.replace(".", "").replace(",", "."))
 
+    def is_number(self, field: str) -> bool:
+        """Whether a field is one."""
+        try:
+            self.number(field)
+        except ValueError:
+            return False
+        return True
+
 
 def read_text(path: Path, side: Sidecar) -> Table:
     """Read a text file; what the sidecar does not say of its form is seen from the file."""
@@ -51,7 +60,9 @@ def read_text(path: Path, side: Sidecar) -> Table:
     dialect = _dialect(texts[: _LOOKED_AT + 1], side)
     header = [name.strip() for name in dialect.split(texts[0])]
     first, units = 1, {}
-    if len(texts) > 2 and (found := _units(dialect, texts[1])) and len(found) == len(header):
+    if untitled := all(dialect.is_number(field) for field in header):
+        header, first = [f"{UNTITLED}{k}" for k in range(1, len(header) + 1)], 0
+    if len(texts) > 2 and not untitled and (found := _units(dialect, texts[1])) and len(found) == len(header):
         first, units = 2, {index: unit for index, unit in enumerate(found) if unit}
     body, lines = texts[first:], [number for number, _ in numbered[first:]]
 
@@ -117,13 +128,15 @@ def _dialect(texts: list[str], side: Sidecar) -> Dialect:
     delimiter = side.delimiter
     if delimiter is None:
 
-        def fit(candidate: str) -> tuple[int, bool, int]:
+        def fit(candidate: str) -> tuple[bool, int, bool, int]:
             split = Dialect(candidate, ".").split
-            n = len(split(texts[0]))  # white space may also stand around what parts the fields, as in "0 | 1"
-            return (sum(len(split(text)) == n for text in texts[1:]) if n > 1 else 0, candidate != " ", n)
+            fields = split(texts[0])
+            n = len(fields)  # white space may also stand around what parts the fields, as in "0 | 1"
+            all_numbers = n > 1 and all(Dialect(candidate, "," if "," in f else ".").is_number(f) for f in fields)
+            return all_numbers, sum(len(split(text)) == n for text in texts[1:]) if n > 1 else 0, candidate != " ", n
 
         delimiter = max(_DELIMITERS, key=fit)
-        if fit(delimiter)[0] == 0:
+        if fit(delimiter)[1] == 0:
             delimiter = ","
     if side.decimal:
         return Dialect(delimiter, side.decimal)

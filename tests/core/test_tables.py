@@ -139,6 +139,21 @@ def test_what_cannot_be_read_is_one_line(name, content, says, tmp_path):
     assert "\n" not in str(caught.value)
 
 
+def test_columns_without_titles_are_called_by_their_number(tmp_path):
+    path = tmp_path / "x.csv"
+    path.write_text("\n".join(rows(";", ",")))
+    with pytest.raises(RecordError, match=r"missing column 't \[s\]' \(columns: column 1, column 2, column 3\)"):
+        read_record(path)
+    plan = {f"column {k + 1}": column for k, column in enumerate(PLAN.columns.values())}
+    check(read_record(path, sidecar.Sidecar(columns=plan)))
+
+
+def test_what_the_owner_says_is_to_be_ignored_is_understood(tmp_path):
+    (tmp_path / "x.csv").write_text("t [s],i_q [A],note,why\n0,1,2,3\n1,2,3,4\n")
+    (tmp_path / "x.record.yaml").write_text("columns: {note: ignore}")
+    assert read_record(tmp_path / "x.csv").ignored == ("why",)
+
+
 def test_a_plan_that_names_a_column_that_is_not_there_is_told_as_the_plant_file_s(tmp_path):
     (tmp_path / "x.csv").write_text("t [s],i_q [A]\n0,1\n1,2\n")
     with pytest.raises(RecordError, match="plant file, key 'record': no column drehzahl, strom, zeit"):

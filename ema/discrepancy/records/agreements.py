@@ -66,7 +66,7 @@ def _found(record: Record) -> Iterator[Agreement]:
     for position, speed in (("theta_m", "w_m"), ("q", "v")):
         if {position, speed} <= have:
             yield _same(f"{speed} against d{position}/dt", _speeds(record, position, speed))
-    for speed, position in (("w_m", "theta_m"), ("v", "q")):
+    for speed, position in (("w_m", "theta_m"), ("v", "q")) if not record.is_at_rest else ():
         for drive in ("i_q", "torque", "force"):
             if drive in have and have & {speed, position}:
                 name = speed if speed in have else position

@@ -6,15 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ema.core.errors import RecordError
 from ema.core.names import CHANNELS, CURRENTS
 from ema.core.records import Record
-from ema.discrepancy.axis.reading.channels import LOAD_CHANNEL, LOOP_CHANNELS
+from ema.discrepancy.axis.reading.channels import LOAD_CHANNEL, LOOP_CHANNELS, roles
+from ema.discrepancy.axis.reading.intake import take_in
+from ema.discrepancy.axis.reading.undersampled import refuse_undersampled
+from ema.models.axis_config import Axis
 
 from .agreements import Agreement
 from .facts import FALLEN, ChannelFacts, Sampling
 
 ACTUATOR = ("t", *CURRENTS, "theta_m", "theta_u", "theta_cmd")
-DRIVES = ("i_q", "torque", "force", "u_q", "duty", "w_ref")
+DRIVES = ("torque", "force", "i_q", "u_q", "duty", "w_ref")  # the first of them that is there drives
 FEW = 500  # samples of a record from which a fit has something left to be tested with
 DUTY = 1.1  # largest duty cycle, with what a converter may add
 JITTERY = 0.2  # of a period, rms
@@ -22,15 +26,21 @@ JITTERY = 0.2  # of a period, rms
 
 @dataclass(frozen=True)
 class Allowed:
-    """Plants that the record is enough for, each with what it can identify; and what stands in the way, in words."""
+    """Plants that the record is enough for, each with what it can identify; and what stands in the way, in words.
+
+    `refused` tells why a search would not take it as a record of the plant file that was given, if it would not.
+    """
 
     plants: dict[str, str]
     missing: dict[str, list[str]]
     obstacles: list[str]
+    refused: str = ""
 
 
-def list_allowed(record: Record, clock: Sampling, facts: list[ChannelFacts], agree: list[Agreement]) -> Allowed:
-    """What the record allows, as far as its channels show it."""
+def list_allowed(
+    record: Record, clock: Sampling, facts: list[ChannelFacts], agree: list[Agreement], plant: Axis | None = None
+) -> Allowed:
+    """What the record allows, as far as its channels show it; of an axis whose `plant` file is known, as one of it."""
     have = set(record.channels)
     plants: dict[str, str] = {}
     missing: dict[str, list[str]] = {}
@@ -45,7 +55,7 @@ def list_allowed(record: Record, clock: Sampling, facts: list[ChannelFacts], agr
     if motion and drives:
         load = LOAD_CHANNEL[not motion & {"theta_m", "w_m"}]
         against = f" against the known load {load}" if load in have else ""
-        plants["axis"] = f"inertia, friction, loads and the effects of an axis, driven by {', '.join(drives)}{against}"
+        plants["axis"] = f"inertia, friction, loads and the effects of an axis, driven by {_one_of(drives)}{against}"
     elif loops:
         plants["axis"] = (
             "inertia, friction, loads and the effects of an axis, if the plant file declares the position_loop "
@@ -56,8 +66,35 @@ def list_allowed(record: Record, clock: Sampling, facts: list[ChannelFacts], agr
         a_drive = f"a drive: {', '.join(DRIVES)}, or {references} of a position_loop"
         missing["axis"] = [] if motion else ["a position or a speed: theta_m, w_m, q or v"]
         missing["axis"] += [] if drives else [a_drive]
+    refused = ""
+    if plant is not None:
+        drive, refused = _take(plant, record)
+        drives = [drive] if drive else drives
+        plants.pop("ema", None)
+        missing.pop("ema", None)
+        if drive and plants:
+            plants["axis"] = f"{plants['axis'].partition(', driven by')[0]}, driven by {drive}"
     disagreeing = [f"{one.what}: {one.said}" for one in agree if not one.is_fine]
-    return Allowed(plants, missing, [*_clock(clock), *_channels(facts), *disagreeing])
+    facts = [one for one in facts if not (record.is_at_rest and one.name in ("w_m", "v"))]
+    by_time = [] if record.is_at_rest else _clock(clock)
+    return Allowed(plants, missing, [*by_time, *_channels(facts, drives), *disagreeing], refused)
+
+
+def _one_of(drives: list[str]) -> str:
+    """What may drive: `ema plant init` takes the first, and a plant file says which."""
+    more = f", or by {' or '.join(drives[1:])} where the plant file's drive says so" if len(drives) > 1 else ""
+    return f"{drives[0]}{more}"
+
+
+def _take(plant: Axis, record: Record) -> tuple[str, str]:
+    """The channel that drives, and why a search refuses the record; one of them is empty."""
+    try:
+        (taken,) = take_in(plant, [record])
+        refuse_undersampled(plant, taken)
+        drive = roles(plant, taken).drive
+    except RecordError as error:
+        return "", str(error).removeprefix(f"{record.name}: ")
+    return ("duty" if drive == "u_q" and drive not in record.channels else drive), ""
 
 
 def say_repeated(n: int) -> str:
@@ -82,7 +119,8 @@ def _clock(clock: Sampling) -> list[str]:
     return said
 
 
-def _channels(facts: list[ChannelFacts]) -> list[str]:
+def _channels(facts: list[ChannelFacts], drives: list[str]) -> list[str]:
+    """Of each channel; where several may drive, what is sampled too slowly is in the way of the first of them."""
     said = []
     for one in facts:
         if one.is_constant:
@@ -92,7 +130,7 @@ def _channels(facts: list[ChannelFacts]) -> list[str]:
             said.append(f"{one.name} is held at an end of its range for {share}: clipped, or a limit")
         if one.name == "duty" and max(one.high, -one.low) > DUTY:
             said.append(f"duty goes to {max(one.high, -one.low):g} where 1 is the whole supply: in per cent? unit: '%'")
-        if one.name in DRIVES and one.upper > FALLEN:
+        if one.name in drives[:1] and one.upper > FALLEN:
             said.append(
                 f"{one.name} does not fall off before half the sampling rate ({100 * one.upper:.0f} % of its power "
                 "is in the upper part): sampled too slowly for what it does; record faster, or move more slowly"

@@ -35,8 +35,9 @@ class Known:
 class Sheet:
     """What a data sheet says; None where it does not. Units: rpm/V, ohm (phase), H (phase), kg m², N m/A, V.
 
-    A `brushed` motor has the back-EMF constant of its torque; of three phases it is that of one. `torque_at` and
-    `measured_at` are sides of the gear: of a torque sensor, and of position and speed.
+    A `brushed` motor has the back-EMF constant of its torque; of three phases it is that of one. `drive` is the
+    channel that drives, where several may. `torque_at` and `measured_at` are sides of the gear: of a torque sensor, and
+    of position and speed.
     """
 
     pole_pairs: int | None = None
@@ -48,6 +49,7 @@ class Sheet:
     J: float | None = None
     V_dc: float | None = None
     brushed: bool = False
+    drive: str | None = None
     torque_at: str | None = None
     measured_at: str | None = None
 
@@ -79,7 +81,10 @@ def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
     if not have & {position, speed}:
         raise RecordError(f"{records[0].name}: no motion: theta_m, w_m, q or v is wanted (has {there})")
     measured = "force" if linear else "torque"
-    drive = next((name for name in (measured, "i_q", "u_q", "duty") if name in have), None)
+    drives = [name for name in (measured, "i_q", "u_q", "duty") if name in have]
+    if sheet.drive is not None and sheet.drive not in drives:
+        raise RecordError(f"{records[0].name}: {sheet.drive} cannot drive: {' or '.join(drives) or 'nothing'} may")
+    drive = sheet.drive or next(iter(drives), None)
     if drive is None:
         said = f"{records[0].name}: no drive: {measured}, i_q, u_q or duty is wanted (has {there})"
         _, reference = LOOP_CHANNELS[linear]
@@ -88,7 +93,8 @@ def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
         raise RecordError(said)
     known = [Known("kind", "axis", "")] + ([Known("motion", "linear", "")] if linear else [])
     kind = {"i_q": "current", "u_q": "voltage", "duty": "voltage"}.get(drive, drive)
-    known.append(Known("drive", kind, f"by the channel {drive}"))
+    others = " or ".join(name for name in drives if name != drive)
+    known.append(Known("drive", kind, f"by the channel {drive}{f'; {others} by --drive' if others else ''}"))
     k_t, k_e, whence = _constants(sheet)
     if kind in ("current", "voltage"):
         known += [Known("k_t", _number(k_t, "N/A" if linear else "N m/A"), whence)]

@@ -10,15 +10,16 @@ from scipy import stats
 from ema.core.names import CHANNELS
 from ema.core.records import Array, Record
 from ema.discrepancy.axis.reading.channels import find_runs, is_cut_off
-from ema.discrepancy.axis.reading.noise import estimate, quantum
+from ema.discrepancy.axis.reading.noise import LEVELS, estimate, is_levelled, quantum
 
 LONG = 1.5  # a step of time longer than so many median steps is a gap
 HELD = 3  # samples in a row at a channel's end from which it is held there
-LEVELS = 5  # values from which a channel is more than a command between some levels
 # A parabola's top step lasts at most 1/(√2 - 1) = 2.4 times as long as the next one on both its sides; twice that.
 PARABOLA = 2.0 / (np.sqrt(2.0) - 1.0)
 POSITIONS = ("theta_m", "q", "theta_u", "theta_n")  # come to rest where they turn round, held by friction
-COMMANDS = ("theta_ref", "q_ref", "theta_cmd", "w_ref")  # may dwell where they like
+COMMANDS = ("theta_ref", "q_ref", "theta_cmd", "w_ref")
+DWELLING = (*COMMANDS, "u_q", "duty", "enabled")  # may dwell where they like, a drive also at its limit
+ROUNDING = 1e-9  # of a channel's range: what writing it as text makes of a number that is exact
 ENDS = 0.002  # share of a channel's samples at its end from which that is a limit, not a peak
 BY_CHANCE = 1e-6  # probability of as many repeated rows in a record that lost none
 CAUGHT_UP = 1.5  # times the step before: halfway from one that goes on (1) to one that makes up for a lost one (2)
@@ -152,10 +153,12 @@ def _channel(record: Record, name: str) -> ChannelFacts:
     x = np.concatenate(parts)
     low, high = float(x.min()), float(x.max())
     constant = low == high
-    noise = 0.0 if constant else estimate(record.cycles, name, record.resolution.get(name)).sigma
-    step = 0.0 if constant else record.resolution.get(name) or max(quantum(part) for part in parts)
+    levels = constant or is_levelled(name, x)
+    noise = 0.0 if levels else estimate(record.cycles, name, record.resolution.get(name)).sigma
+    noise = noise if noise > ROUNDING * (high - low) else 0.0
+    step = 0.0 if levels else record.resolution.get(name) or max(quantum(part) for part in parts)
     upper = 0.0 if constant else max(_upper(part, noise) for part in parts)
-    ends: tuple[float, ...] = () if name in COMMANDS else (low, high)
+    ends: tuple[float, ...] = () if name in DWELLING else (low, high)
     if name in POSITIONS:
         ends = tuple(end for end in ends if not constant and is_cut_off(x, end))
     held = _held(parts, ends, step)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from ema.core.names import CHANNELS
 from ema.core.table import Table
 from ema.core.table_records import titled
+from ema.core.text_table import UNTITLED
 from ema.core.units import convert
 
 from .shown import Shown
@@ -65,6 +66,8 @@ def propose(table: Table) -> list[Proposal]:
 
     What was commanded is proposed for a drive only where nothing that was measured is.
     """
+    if table.header[0] == f"{UNTITLED}1":
+        return _propose_untitled(table)
     seen = [_quantity(title, table.units.get(index)) for index, title in enumerate(table.header)]
     measured = {what for what, _ in seen}
     is_linear = bool(measured & {"length", "speed"} or ("force" in measured and not measured & {"angle", "turning"}))
@@ -108,6 +111,18 @@ def propose(table: Table) -> list[Proposal]:
             found[index] = Proposal(title, channel, unit or CHANNELS[channel].unit, said)
     both = {"torque", "i_q"} <= taken.keys()
     return [_ask_whose(found[index]) if both else found[index] for index in range(len(seen))]
+
+
+def _propose_untitled(table: Table) -> list[Proposal]:
+    """Time, where one of the columns rises; of all others what its owner needs to know it by."""
+    shown = Shown(table)
+    time = next((k for k in range(len(table.header)) if shown.rises(k)), None)
+    return [
+        Proposal(title, "t", "s", f"rises from row to row, {shown.ends(k)}: is it time in s?")
+        if k == time
+        else Proposal(title, None, None, f"the file has no titles; {shown.ends(k)}: {{channel: …, unit: …}}")
+        for k, title in enumerate(table.header)
+    ]
 
 
 def _why_not(table: Table, index: int, what: str | None, channel: str | None, is_linear: bool) -> str | None:

@@ -33,6 +33,16 @@ class Shown:
             return None
         return column if np.isfinite(column).all() else None
 
+    def ends(self, index: int) -> str:
+        """From where to where a column goes, in words; empty where it is no numbers."""
+        x = self._numbers(index)
+        return "" if x is None else f"goes from {x.min():.6g} to {x.max():.6g}"
+
+    def rises(self, index: int) -> bool:
+        """Whether a column rises from row to row, as time does."""
+        x = self._numbers(index)
+        return x is not None and bool((np.diff(x) > 0.0).all())
+
     def is_zero(self, index: int) -> bool:
         """Whether a column is zero in all rows."""
         x = self._numbers(index)

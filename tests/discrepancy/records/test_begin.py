@@ -116,14 +116,16 @@ def test_one_speed_shows_neither_inertia_nor_drag(tmp_path):
     assert all("a guess" in line for line in lines if line.startswith(("J:", "C:")))
 
 
+@pytest.mark.parametrize("beside", [(), ("i_q",)])
 @pytest.mark.parametrize("channel", ["u_q", "duty"])
-def test_a_voltage_or_a_duty_cycle_drives(channel, tmp_path):
+def test_a_voltage_or_a_duty_cycle_drives(channel, beside, tmp_path):
     R, supply = 0.8, 24.0
     cycle = bench().cycles[0]
     u = R * cycle["i_q"] + K_T * cycle["w_m"]
     whole, said = (supply, ("--supply", str(supply))) if channel == "duty" else (1.0, ())
-    channels = {name: cycle[name] for name in ("t", "theta_m", "w_m")} | {channel: u / whole}
-    options = ("--k-t", str(K_T), "--R", str(R), "--brushed", *said)
+    channels = {name: cycle[name] for name in ("t", "theta_m", "w_m", *beside)} | {channel: u / whole}
+    options = ("--k-t", str(K_T), "--R", f"{1e3 * R:g}mohm", "--brushed", *said)
+    options += ("--drive", channel) if beside else ()
     plant = axis_config.load(init(Record((Cycle(0, channels),)), tmp_path, *options))
     assert plant.drive == "voltage"
     assert plant.k_e == plant.k_t == K_T

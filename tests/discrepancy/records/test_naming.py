@@ -244,3 +244,11 @@ def test_a_map_of_torque_over_angle_is_readings_at_rest(tmp_path):
     (term,) = describe(balance(AxisPlant(plant, [read_record(path)])), linear=False)["terms"]
     values = {name: q["value"] for name, q in term["parameters"].items()}
     assert values == pytest.approx({"amplitude": 8e-3, "order": 36.0, "phase": 0.4}, rel=0.02)
+
+
+def test_of_a_file_without_titles_time_is_proposed_and_the_rest_told_by_its_numbers(tmp_path):
+    t = np.arange(50) * 0.01
+    np.savetxt(tmp_path / "bench.csv", np.stack([np.sin(9.0 * t), 3.0 + t], axis=1), delimiter=",", fmt="%.6f")
+    answer = CliRunner().invoke(cli, ["records", "map", str(tmp_path / "bench.csv")], catch_exceptions=False)
+    assert channels(answer) == {"column 1": "ignore", "column 2": ("t", "s")}
+    assert "goes from -0.9" in answer.stdout

@@ -148,7 +148,7 @@ class Bench:
 def bench(plant: Axis, record: Record, name: str, length: float) -> Bench:
     """Cut one record into windows of about `length` seconds."""
     who = roles(plant, record)
-    static = who.speed is not None and all(not cycle[who.speed].any() for cycle in record)
+    static = record.is_at_rest
     if static:  # readings at rest follow each other by number, not by time
         numbered = tuple(Cycle(c.number, {**c.channels, "t": np.arange(float(c.n_samples))}, c.label) for c in record)
         record = replace(record, cycles=numbered)
