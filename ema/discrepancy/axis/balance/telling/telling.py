@@ -85,6 +85,7 @@ def _term(b: Balance, term: Term) -> dict[str, Any]:
     out = {
         **of_law(b, term.law, draw_law(b, term)),
         "confidence": round(b.confidence(term), 4),
+        "confidence_of_set": round(b.of_set(term), 4),
         "indistinguishable_from": list(term.others),
         "separated_by": term.law.separated_by,
         "share": short(term.power / b.drive),
@@ -141,9 +142,11 @@ def _number(name: str, q: dict[str, Any]) -> str:
 
 def _said(term: dict[str, Any]) -> str:
     if term["name"].endswith("_by_record") and term["confidence"] < CONTRADICTED:
-        return f"what records contradict each other in ({term['name'].removesuffix('_by_record')})"
+        name = term["name"].removesuffix("_by_record").replace("_", " ")
+        return f"something like {name}, in which the records contradict each other"
     q = next(iter(term["parameters"].values()))
     text = f"{term['sentence']} ({q['low']:.3g} … {q['high']:.3g})"
     if term["indistinguishable_from"]:
         text += f", or {' or '.join(term['indistinguishable_from'])}"
-    return text if term["confidence"] >= SURE else f"perhaps ({term['confidence']:.0%}) {text}"
+    sure = term["confidence_of_set"]
+    return text if sure >= SURE else f"perhaps ({sure:.0%}) {text}"
