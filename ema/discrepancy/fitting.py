@@ -1,9 +1,14 @@
-"""Bounded least squares of free parameters on some blocks of a plant."""
+"""Bounded least squares of free parameters on some blocks of a plant.
+
+Where a recorded drive with noise drives the plant, parameters that take less of it (a larger inertia, a lag) leave
+a smaller residual. So the squares of what a further draw of that noise adds to the residual (`Plant.noisier`) count
+against its own: least squares with errors in the regressors, see `docs/decisions/0020-noise-in-the-fit.md`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -23,6 +28,11 @@ RUNAWAY = 1e4
 LONGEST = 30.0  # scales of a parameter in one step
 N_DAMPINGS = 6  # tried before a fit gives up
 LEAST = 1e-6  # of the largest eigenvalue, below which a direction rests on one block alone
+MOVED = 0.3  # deviations of a parameter by which noise must move it to be followed in each iteration
+KNOWN_TO = 1.0 / 3.0  # relative deviation of the power of the drive's noise
+MOST_NOISE = (
+    0.9  # of what the residual shows of a direction, in a step: were it all noise, the step would have no length
+)
 CONVERGED = 0.02  # gain in log-likelihood of a step below which a fit has converged
 
 
@@ -37,6 +47,8 @@ class Fit:
         Values of free and fixed parameters.
     residuals : list of arrays
         Whitened residuals by block.
+    more : list of arrays
+        What a further draw of the drive's noise adds to them; empty where the plant knows of none.
     covariance : array, shape (n_free, n_free)
         Of the free parameters; scaled by the residual where that is larger than noise, and as wide as blocks disagree.
     blocks : tuple of int
@@ -53,6 +65,7 @@ class Fit:
     blocks: tuple[int, ...]
     scale: float
     by_noise: Array
+    more: list[Array] = field(default_factory=list)
 
     def draw(self, n: int, seed: int = 0) -> list[Point]:
         """Points drawn from the fit's uncertainty, clipped to the bounds."""
@@ -84,10 +97,27 @@ def log_likelihood(residuals: Sequence[Array], scale: float) -> list[Array]:
     return out
 
 
-def rate(runs: Sequence[Sequence[Array]]) -> list[float]:
-    """Log-likelihood of several residuals of the same blocks, all at the smallest of their scales."""
+def rate(runs: Sequence[Sequence[Array]], more: Sequence[Sequence[Array]] = ()) -> list[float]:
+    """Log-likelihood of several residuals of the same blocks, all at the smallest of their scales.
+
+    `more` is what a further draw of the drive's noise adds to each (`add_by_noise`).
+    """
     scale = min(scale_of(r) for r in runs)
-    return [float(sum(s.sum() for s in log_likelihood(r, scale))) for r in runs]
+    rates = [float(sum(s.sum() for s in log_likelihood(r, scale))) for r in runs]
+    return [own + _given_back(d, scale) for own, d in zip(rates, more, strict=True)] if more else rates
+
+
+def _given_back(more: Sequence[Array], scale: float) -> float:
+    """Half the squares that noise of the drive makes of a residual, at its scale. [nats]"""
+    return float(sum(0.5 * (d**2).sum() for d in more) / scale**2)
+
+
+def add_by_noise(plant: Plant, point: Point, blocks: Sequence[int], residuals: Sequence[Array]) -> list[Array]:
+    """What a further draw of the drive's noise adds to the `residuals` at a point; empty where it shows no noise."""
+    if plant.noisier is None:
+        return []
+    again = plant.noisier.residuals([point], blocks)[0]
+    return [np.clip(b - a, -HUBER, HUBER) for a, b in zip(residuals, again, strict=True)]
 
 
 def _flat(residuals: Sequence[Array]) -> Array:
@@ -112,10 +142,35 @@ def jacobian(
     return np.stack([(run - here) / step for run, step in zip(runs, steps, strict=True)], axis=1)
 
 
+def slopes(
+    plant: Plant,
+    free: Sequence[Free],
+    point: Point,
+    blocks: Sequence[int],
+    rows: Array,
+    moved: NDArray[np.bool_] | None = None,
+) -> Array:
+    """Of the residual, and below it of what noise of the drive adds to it (`add_by_noise`), by `free`.
+
+    Shape (n_rows, n_free); `rows` are both at the point. What noise adds has no slope by those that it has not `moved`.
+    """
+    if plant.noisier is None:
+        return jacobian(plant, free, point, blocks, rows)
+    here, more = np.split(rows, 2)
+    own = jacobian(plant, free, point, blocks, here)
+    of_more = np.zeros_like(own)
+    which = [j for j in range(len(free)) if moved is None or moved[j]]
+    if which:
+        with_more = jacobian(plant.noisier, [free[j] for j in which], point, blocks, here + more)
+        of_more[:, which] = np.where(np.abs(more) < HUBER, 1.0, 0.0)[:, None] * (with_more - own[:, which])
+    return np.vstack((own, of_more))
+
+
 class _Objective:
     """Huber's loss of the residuals, and of what is known beforehand, over the values `x` of the free parameters.
 
-    The scale of the residuals is that of `start` throughout.
+    Rows are the residuals and, where the drive is noisy, what more of its noise adds to them: the squares of these
+    count against the others'. The scale of the residuals is that of `start` throughout.
     """
 
     def __init__(
@@ -130,53 +185,91 @@ class _Objective:
             self.prior_slopes[row, j] = 1.0 / sd
         self.prior_centre = np.array([f.start for f in free])
         self.x0 = np.clip(np.array([start[f.name] for f in free]), self.low, self.high)
-        self.residuals0 = self.residuals(self.x0)
-        self.scale = scale_of(self.residuals0)
+        self.run0 = self.run(self.x0)
+        self.n_blocks, self.n_rows = len(self.run0[0]), sum(r.size for r in self.run0[0])
+        self.scale = scale_of(self.run0[0])
 
     def at(self, x: Array) -> Point:
         return {**self.start, **dict(zip([f.name for f in self.free], x.tolist(), strict=True))}
 
-    def residuals(self, x: Array) -> list[Array]:
-        return self.plant.residuals([self.at(x)], self.blocks)[0]
+    def run(self, x: Array) -> tuple[list[Array], list[Array]]:
+        """Residuals, and what more noise of the drive adds to them."""
+        residuals = self.plant.residuals([self.at(x)], self.blocks)[0]
+        return residuals, add_by_noise(self.plant, self.at(x), self.blocks, residuals)
 
     def prior(self, x: Array) -> Array:
         """Deviations from what is known beforehand, in its standard deviations."""
         return np.asarray(self.prior_slopes @ (x - self.prior_centre))
 
-    def loss(self, r: Array, x: Array) -> float:
-        u = np.minimum(np.abs(r) / self.scale, RUNAWAY)
-        p = self.prior(x) / self.scale
-        return float(np.where(u < HUBER, 0.5 * u * u, HUBER * (u - 0.5 * HUBER)).sum() + 0.5 * (p @ p))
+    def loss(self, rows: Array, x: Array) -> float:
+        u = np.minimum(np.abs(rows[: self.n_rows]) / self.scale, RUNAWAY)
+        p, more = self.prior(x) / self.scale, rows[self.n_rows :] / self.scale
+        huber = np.where(u < HUBER, 0.5 * u * u, HUBER * (u - 0.5 * HUBER)).sum()
+        return float(huber - 0.5 * (more @ more) + 0.5 * (p @ p))
 
-    def slopes(self, x: Array, r: Array) -> Array:
+    def slopes(self, x: Array, rows: Array, moved: NDArray[np.bool_] | None = None) -> Array:
         n_frozen = 0 if self.frozen is None else self.frozen.shape[1]
-        own = jacobian(self.plant, self.free[n_frozen:], self.at(x), self.blocks, r)
+        moving = None if moved is None else moved[n_frozen:]
+        own = slopes(self.plant, self.free[n_frozen:], self.at(x), self.blocks, rows, moving)
         return own if self.frozen is None else np.hstack((self.frozen, own))
 
-    def normal(self, J: Array, r: Array, x: Array) -> tuple[Array, Array]:
+    def moved(self, J: Array, rows: Array) -> NDArray[np.bool_]:
+        """Parameters that noise of the drive moves, each by itself."""
+        of_r, of_d = J[: self.n_rows], J[self.n_rows :]
+        curvature = np.maximum(np.sum(of_r**2, axis=0), 1e-300)
+        return np.asarray(np.abs(of_d.T @ rows[self.n_rows :]) > MOVED * self.scale * np.sqrt(curvature))
+
+    def normal(self, J: Array, rows: Array, x: Array) -> tuple[Array, Array]:
         """Normal matrix and gradient with Huber's weights, for parameters in units of their scales."""
+        r, d = rows[: self.n_rows], rows[self.n_rows :]
         weight = np.minimum(1.0, HUBER * self.scale / np.maximum(np.abs(r), 1e-300))
         Js, own = J * self.scales, self.prior_slopes * self.scales
-        return Js.T @ (weight[:, None] * Js) + own.T @ own, Js.T @ (weight * r) + own.T @ self.prior(x)
+        of_r, of_d = Js[: self.n_rows], Js[self.n_rows :]
+        A = of_r.T @ (weight[:, None] * of_r)
+        g = of_r.T @ (weight * r) - of_d.T @ d + own.T @ self.prior(x)
+        return _less(A, of_d.T @ of_d) + own.T @ own, g
 
     def by_noise(self, J: Array) -> Array:
         """Covariance of the free parameters, were noise all that is left."""
         Js, own = J * self.scales, self.prior_slopes * self.scales
-        found = np.linalg.pinv(Js.T @ Js + own.T @ own, rcond=1e-12, hermitian=True)
+        found = self._sandwiched(Js, own.T @ own)
         return np.asarray(found * np.outer(self.scales, self.scales))
 
-    def covariance(self, J: Array, residuals: Sequence[Array], scale: float) -> Array:
+    def _sandwiched(self, Js: Array, known: Array) -> Array:
+        """Covariance where the residual's rows have unit noise: as for errors in the regressors."""
+        of_r, of_d = Js[: self.n_rows], Js[self.n_rows :]
+        A = of_r.T @ of_r
+        inverse = np.linalg.pinv(_less(A, of_d.T @ of_d) + known, rcond=1e-12, hermitian=True)
+        return np.asarray(inverse @ (A + known) @ inverse)
+
+    def covariance(self, J: Array, rows: Array, residuals: Sequence[Array], scale: float) -> Array:
         """Of the free parameters, where residuals have this scale; each as wide as blocks disagree on it, at least."""
         Js = J * self.scales
         own = self.prior_slopes * self.scales * scale  # the prior is not loosened by a poor residual
-        A = Js.T @ Js + own.T @ own
-        found = np.linalg.pinv(A, rcond=1e-12, hermitian=True) * scale**2
-        ends = np.cumsum([0, *(r.size for r in residuals)])
-        r = np.clip(_flat(residuals), -HUBER * scale, HUBER * scale)
-        parts = ((Js[a:b], r[a:b]) for a, b in pairwise(ends.tolist()))
-        shown = left_out.covariance(A, ((P.T @ P, P.T @ own_r) for P, own_r in parts), LEAST)
+        found = self._sandwiched(Js, own.T @ own) * scale**2
+        of_r, of_d = Js[: self.n_rows], Js[self.n_rows :]
+        A = _less(of_r.T @ of_r, of_d.T @ of_d) + own.T @ own
+        r, d = np.clip(rows[: self.n_rows], -HUBER * scale, HUBER * scale), rows[self.n_rows :]
+        ends = pairwise(np.cumsum([0, *(block.size for block in residuals)]).tolist())
+        parts = ((of_r[a:b], r[a:b], of_d[a:b], d[a:b]) for a, b in ends)
+        grams = ((P.T @ P - Q.T @ Q, P.T @ own_r - Q.T @ own_d) for P, own_r, Q, own_d in parts)
+        shown = left_out.covariance(A, grams, LEAST)
         wider = np.sqrt(np.maximum(np.diag(shown) / np.maximum(np.diag(found), 1e-300), 1.0))
-        return np.asarray(found * np.outer(wider * self.scales, wider * self.scales))
+        by = KNOWN_TO * np.linalg.pinv(A, rcond=1e-12, hermitian=True) @ (of_d.T @ d)  # were there as much more of it
+        found = found * np.outer(wider, wider) + np.outer(by, by)
+        return np.asarray(found * np.outer(self.scales, self.scales))
+
+
+def _less(A: Array, of_noise: Array) -> Array:
+    """A normal matrix without what noise makes of it, of no direction more than `MOST_NOISE`."""
+    if not of_noise.any():
+        return A
+    values, vectors = np.linalg.eigh(A)
+    root = vectors * np.sqrt(np.maximum(values, 1e-12 * values[-1]))
+    inverse = np.linalg.inv(root)
+    share, along = np.linalg.eigh(inverse @ of_noise @ inverse.T)
+    along = root @ along
+    return np.asarray(A - (along * np.minimum(share, MOST_NOISE)) @ along.T)
 
 
 def fit(
@@ -194,35 +287,37 @@ def fit(
     pushes outwards are held there. (`scipy.optimize.least_squares` decomposes the whole Jacobian in every iteration,
     ten times the cost of the simulations here.)
 
-    `frozen`, shape (n_residuals, n_known): slopes of the first `n_known` parameters, taken as they are instead of
+    `frozen`, shape (n_rows, n_known): `slopes` of the first `n_known` parameters, taken as they are instead of
     being differenced in every iteration (a few parameters are added to many that are fitted already).
     """
     of = _Objective(plant, tuple(free), start, tuple(blocks), frozen)
-    x, residuals = of.x0, of.residuals0
-    r = _flat(residuals)
-    here, damping = of.loss(r, x), 1e-3
-    J = of.slopes(x, r)
+    x, run = of.x0, of.run0
+    rows = _flat([*run[0], *run[1]])
+    here, damping = of.loss(rows, x), 1e-3
+    J = of.slopes(x, rows)
+    moved = of.moved(J, rows)
     for _ in range(max_iterations if free else 0):
-        A, g = of.normal(J, r, x)
+        A, g = of.normal(J, rows, x)
         held = ((x <= of.low) & (g > 0.0)) | ((x >= of.high) & (g < 0.0))
         for _ in range(N_DAMPINGS):
             x_new = np.clip(x + _step(A, g, damping, ~held) * of.scales, of.low, of.high)
-            trial = of.residuals(x_new)
-            r_new = _flat(trial)
-            there = of.loss(r_new, x_new)
+            trial = of.run(x_new)
+            rows_new = _flat([*trial[0], *trial[1]])
+            there = of.loss(rows_new, x_new)
             if there < here:
                 break
             damping = max(10.0 * damping, 1e-3)
         else:
             break
-        gained, here, x, r, residuals = here - there, there, x_new, r_new, trial
+        gained, here, x, rows, run = here - there, there, x_new, rows_new, trial
         damping = max(0.1 * damping, 1e-9)
         if gained < CONVERGED:
             break
-        J = of.slopes(x, r)
+        J = of.slopes(x, rows, moved)
+    residuals, more = run
     scale = scale_of(residuals)
-    covariance = of.covariance(J, residuals, scale)
-    return Fit(of.free, of.at(x), residuals, covariance, of.blocks, scale, of.by_noise(J))
+    covariance = of.covariance(J, rows, residuals, scale)
+    return Fit(of.free, of.at(x), residuals, covariance, of.blocks, scale, of.by_noise(J), more)
 
 
 def _step(A: Array, g: Array, damping: float, moving: NDArray[np.bool_]) -> Array:
@@ -250,4 +345,9 @@ def best_fit(
     if len(starts) > 1:
         starts = [starts[j] for j in np.argsort(rate(plant.residuals(starts, blocks)))[::-1][:n_fits]]
     fits = [fit(plant, free, s, blocks, max_iterations=max_iterations, frozen=frozen) for s in starts]
-    return fits[0] if len(fits) == 1 else fits[int(np.argmax(rate([f.residuals for f in fits])))]
+    return fits[0] if len(fits) == 1 else fits[int(np.argmax(rate_fits(fits)))]
+
+
+def rate_fits(fits: Sequence[Fit]) -> list[float]:
+    """Log-likelihood of several fits to the same blocks."""
+    return rate([f.residuals for f in fits], [f.more for f in fits] if fits[0].more else ())

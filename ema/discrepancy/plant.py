@@ -119,10 +119,11 @@ class Plant(Protocol):
         """Whitened residuals by point and block, each of shape (n_channels, n_times)."""
         ...
 
-    def made_by_noise(self, point: Point, blocks: Sequence[int], residuals: Sequence[Array]) -> Sequence[Array]:
-        """Squares that noise of what drives a simulation adds to `residuals`, (n_times,) by block; none: in all alike.
+    @property
+    def noisier(self) -> Plant | None:
+        """The same with a further draw of the noise of what drives the simulation; None where that shows none.
 
-        That depends on the model: one that follows its drive with a lag takes noise from it.
+        What noise adds depends on the model: one that follows its drive with a lag takes noise from it.
         """
         ...
 

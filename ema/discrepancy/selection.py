@@ -10,7 +10,7 @@ import numpy as np
 
 from ema.core.records import Array
 
-from .fitting import Fit, best_fit, fit, jacobian, log_likelihood, rate, scale_of
+from .fitting import Fit, add_by_noise, best_fit, fit, log_likelihood, rate, scale_of, slopes
 from .plant import Block, Candidate, Plant, Point
 
 N_FOLDS = 2
@@ -44,7 +44,7 @@ def split_into_folds(blocks: Sequence[Block]) -> list[list[int]]:
 class Tried:
     """A model fitted on all but one fold, for each fold: `fits`; `held_out` are residuals of the left-out blocks.
 
-    `by_noise` are the squares that noise of what drives the simulation is expected to add to these (`made_by_noise`).
+    `by_noise` is what a further draw of the noise of what drives the simulation adds to these (`add_by_noise`).
     """
 
     accepted: tuple[Candidate, ...]  # by fold the candidates' parameters may differ; these are the first fold's
@@ -132,7 +132,8 @@ def log_scores(tried: Tried, scale: float) -> Array:
     n = max(1, -(-MIN_PARTS // max(len(tried.held_out), 1)))
     blocks = log_likelihood(tried.held_out, scale)
     if tried.by_noise:
-        blocks = [own + 0.5 * squares / scale**2 for own, squares in zip(blocks, tried.by_noise, strict=True)]
+        more = (0.5 * np.sum(d**2, axis=0) / scale**2 for d in tried.by_noise)
+        blocks = [own + given_back for own, given_back in zip(blocks, more, strict=True)]
     return np.array([float(part.sum()) for block in blocks for part in np.array_split(block, n)])
 
 
@@ -160,7 +161,7 @@ def fit_model(
     for (_, left_out), fitted in zip(parts, fits, strict=True):
         residuals = plant.residuals([fitted.point], left_out)[0]
         held.update(zip(left_out, residuals, strict=True))
-        by_noise.update(zip(left_out, plant.made_by_noise(fitted.point, left_out, residuals), strict=False))
+        by_noise.update(zip(left_out, add_by_noise(plant, fitted.point, left_out, residuals), strict=False))
     ordered, noise = (tuple(of[j] for j in sorted(of)) for of in (held, by_noise))
     return Tried(tuple(models[0]), tuple(fits), tuple(tuple(m) for m in models), ordered, noise)
 
@@ -169,7 +170,7 @@ def try_at(plant: Plant, point: Point, residuals: Sequence[Array] | None = None)
     """A model at a point by all blocks, with its `residuals` there if these are known."""
     blocks = range(len(plant.blocks))
     residuals = plant.residuals([point], blocks)[0] if residuals is None else residuals
-    return Tried((), (), (), tuple(residuals), tuple(plant.made_by_noise(point, blocks, residuals)))
+    return Tried((), (), (), tuple(residuals), tuple(add_by_noise(plant, point, blocks, residuals)))
 
 
 def _help_by_other_folds(plant: Plant, own: Fit, fits: Sequence[Fit]) -> Fit:
@@ -179,7 +180,8 @@ def _help_by_other_folds(plant: Plant, own: Fit, fits: Sequence[Fit]) -> Fit:
         if other is own or [f.name for f in other.free] != names or not names:
             continue
         residuals = plant.residuals([other.point], own.blocks)[0]
-        here, there = rate([own.residuals, residuals])
+        more = (own.more, add_by_noise(plant, other.point, own.blocks, residuals)) if own.more else ()
+        here, there = rate([own.residuals, residuals], more)
         if there > here + BETTER:
             own = fit(plant, own.free, other.point, own.blocks)
     return own
@@ -201,9 +203,9 @@ def fit_with_each(
     suggested, frozen = [], []
     for (train, _), fitted in zip(list_folds(plant), model.fits, strict=True):
         suggested.append({c.key: c for c in suggest(fitted.point, train)})
-        here = np.concatenate([r.ravel() for r in fitted.residuals])
+        rows = np.concatenate([r.ravel() for r in (*fitted.residuals, *fitted.more)])
         many = len(fitted.free) > FEW
-        frozen.append(jacobian(plant, fitted.free, fitted.point, train, here) if many else None)
+        frozen.append(slopes(plant, fitted.free, fitted.point, train, rows) if many else None)
     out = {}
     for key in suggested[0]:
         if not all(key in s for s in suggested):

@@ -31,7 +31,7 @@ class Toy:
 
     noise_uncertainty = 0.0
     noise_uncertainties = (0.0, 0.0, 0.0)
-    made_by_noise = staticmethod(lambda *_: ())
+    noisier = None
 
     def __init__(
         self, seed: int, effects: Sequence[str] = ("a", "b"), others: float = 0.0, k: float = 0.0, **hidden: float

@@ -15,6 +15,8 @@ SLOPE = 2.0
 class Toy:
     """y = a x + b x² + an offset of each block of this rms + noise of 1; the model has no offset."""
 
+    noisier = None
+
     def __init__(self, seed: int, offset: float):
         rng = np.random.default_rng(seed)
         self.x = rng.standard_normal((N_BLOCKS, 1)) + 0.3 * rng.standard_normal((N_BLOCKS, N))
@@ -41,3 +43,38 @@ def test_a_fit_of_one_block_has_the_interval_of_its_noise():
     found = fit(Toy(1, 0.0), free, {"a": 1.0, "b": 0.5}, [0])
     x = Toy(1, 0.0).x[0]
     assert found.covariance[0, 0] == pytest.approx(found.scale**2 / (x @ x), rel=1e-3)
+
+
+class NoisyInput:
+    """y = x / m + noise of 1, where x was recorded with noise: a larger m takes less of that, and seems better."""
+
+    def __init__(self, seed: int, more: float = 0.0):
+        rng = np.random.default_rng(seed)
+        x = 2.0 * rng.standard_normal((N_BLOCKS, N))
+        self.y = x / SLOPE + rng.standard_normal(x.shape)
+        self.x = x + NOISE * rng.standard_normal(x.shape)
+        self.x += more * NOISE * rng.standard_normal(x.shape)
+        self.seed, self.more = seed, more
+
+    def residuals(self, points, blocks):
+        return [[(self.y[j] - self.x[j] / p["m"])[None, :] for j in blocks] for p in points]
+
+    @property
+    def noisier(self):
+        return NoisyInput(self.seed, 1.0) if self.more == 0.0 else None
+
+
+NOISE = 1.0
+MASS = [Free("m", "1", 0.1, 20.0, 1.0, 1.0)]
+
+
+def test_noise_of_what_drives_makes_nothing_heavier():
+    found = [fit(NoisyInput(seed), MASS, {"m": 1.5}, range(N_BLOCKS)) for seed in range(TRIALS)]
+    values, sd = np.array([f.point["m"] for f in found]), np.array([np.sqrt(f.covariance[0, 0]) for f in found])
+    assert np.mean(values) == pytest.approx(SLOPE, abs=4.0 * np.std(values) / np.sqrt(TRIALS))
+    assert np.mean(np.abs(values - SLOPE) < 1.96 * sd) > 0.89  # 3.3 deviations of a share of 150
+    plain = NoisyInput(0)
+    plain.more = 1e-300  # its noise is not known of
+    bent = fit(plain, MASS, {"m": 1.5}, range(N_BLOCKS)).point["m"] - SLOPE
+    assert bent > 0.15 * SLOPE
+    assert np.median(sd) < np.hypot(1.3 * np.std(values), 0.5 * bent)  # noise is known to within a third

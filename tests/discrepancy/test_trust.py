@@ -41,7 +41,7 @@ class Columns:
 
     noise_uncertainty = 0.0
     noise_uncertainties = (0.0, 0.0, 0.0)
-    made_by_noise = staticmethod(lambda *_: ())
+    noisier = None
     base = ()
     structure = candidates = errors = describe = describe_structure = None
 

@@ -28,13 +28,11 @@ def tried(plant, **effects):
 
 def test_what_is_added_is_what_smoothing_leaves_of_noise(plant):
     (bench, *_) = plant.benches
-    noisier = add_noise(bench, anew=False)
+    noisier = add_noise(bench)
     for other in noisier.windows:
         assert (other.part.drive[other.first : other.first + other.n] == other.drive).all()
-    less, more = (
-        np.std(np.concatenate([b.drive - a.drive for a, b in zip(bench.windows, other.windows, strict=True)]))
-        for other in (noisier, add_noise(bench, anew=True))
-    )
+    added = [other.drive - w.drive for w, other in zip(bench.windows, noisier.windows, strict=True)]
+    less, more = (np.std(np.concatenate(added[k::2])) for k in (0, 1))
     left = np.concatenate([w.left for w in bench.windows])
     assert less == pytest.approx(bench.noise["i_q"].sigma * np.sqrt(left.mean()), rel=0.15)
     assert less < more < 2.0 * less

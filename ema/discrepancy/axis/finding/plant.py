@@ -30,7 +30,6 @@ from ema.discrepancy.axis.simulating.noise_model import measure_bounded, positio
 from ema.discrepancy.axis.simulating.pack import Pack
 from ema.discrepancy.axis.simulating.predictable import LONGEST_WINDOW, predictable_time
 from ema.discrepancy.axis.simulating.whitening import Filter
-from ema.discrepancy.fitting import HUBER
 from ema.discrepancy.plant import Block, Candidate, Errors, Fitted, Free, Point
 from ema.discrepancy.verdict import BOUND, GROUPS
 from ema.models import axis
@@ -133,27 +132,32 @@ class AxisPlant:
         """Whitened residuals, clipped where a window runs away."""
         return self._map(lambda point: self.whitened(point, blocks), points)
 
-    def made_by_noise(self, point: Point, blocks: Sequence[int], residuals: Sequence[Array]) -> list[Array]:
-        """Squares that noise of the recorded drive adds to the `residuals` at a point, shape (n_times,) by block."""
-        squares: list[list[Array]] = []
-        for other in self._noisier:
-            other.between = self.between
-            again = other.whitened(point, blocks)
-            differences = (np.clip(b - a, -HUBER, HUBER) for a, b in zip(residuals, again, strict=True))
-            squares.append([np.sum(d**2, axis=0) for d in differences])
-        return [np.asarray(np.mean(of, axis=0)) for of in zip(*squares, strict=True)]
+    @property
+    def noisier(self) -> AxisPlant | None:
+        """The same with more of the drive's noise, where it shows any."""
+        if self._noisier is not None:
+            self._noisier.between = self.between
+        return self._noisier
 
     @cached_property
-    def _noisier(self) -> tuple[AxisPlant, ...]:
-        """The same with more of the drive's noise, where it shows any: with less than there was, and with more."""
+    def _share_of_noise(self) -> float:
+        """Of the noise's power as estimated by what is rough; a real torque may be rough too, which a balance shows.
+
+        What the balance leaves holds all noise, and what laws are missing besides.
+        """
+        own = [b for b in (self.balance, *self._balances.values()) if b is not None and b.noise > 0.0]
+        return min([1.0, *(b.left / b.noise for b in own)])
+
+    @cached_property
+    def _noisier(self) -> AxisPlant | None:
         noisy = [not b.static and not b.noise[b.roles.drive].is_bound for b in self.benches]
-        others = []
-        for anew in (False, True) if any(noisy) else ():
-            other = copy(self)
-            pairs = zip(self.benches, noisy, strict=True)
-            other._take([add_noise(b, anew=anew) if is_noisy else b for b, is_noisy in pairs], self.filters)
-            others.append(other)
-        return tuple(others)
+        if not any(noisy):
+            return None
+        other = copy(self)
+        pairs = zip(self.benches, noisy, strict=True)
+        share = self._share_of_noise
+        other._take([add_noise(b, share) if is_noisy else b for b, is_noisy in pairs], self.filters)
+        return other
 
     def candidates(self, point: Point, blocks: Sequence[int]) -> list[Candidate]:
         """Library effects with bounds and starts for this axis."""
