@@ -29,6 +29,8 @@ from .plant import AxisPlant
 LATE = {"straight": 0.0, "held": 0.5, "held before": -0.5}  # samples by which the motion is later than straight
 DELAYS = {"position_delay.time": {"theta_m", "q"}, "speed_delay.time": {"w_m", "v"}}  # and the channels they are of
 OF_DRIVE = {"drive_lag.time": 0.0, "clock_skew.late": -np.inf}  # what else makes the motion late, and the least of it
+LEAST = {**dict.fromkeys(DELAYS, 0.0), **OF_DRIVE}
+HALF, CANNOT_TELL = 0.5, 0.5  # samples by which a drive may be ahead or behind a straight line; the odds are even
 MUCH = 0.5  # share of what is left above noise, from which another way is taken
 NEARLY_HALF = 0.25  # samples by which half a sample may be missed
 ALIKE, LITTLE = 1.05, 2e-3  # times what is left, or share in power of what there was: fewer effects are preferred
@@ -75,6 +77,7 @@ def examine_ways(plant: AxisPlant, progress: Progress | None = None) -> Outcome:
             )
             return outcome
     _widen_delay(plant, outcome)
+    _doubt_small_delay(plant, outcome)
     return _say_way(plant, outcome)
 
 
@@ -237,8 +240,8 @@ def _with_constant_delay(plant: AxisPlant, point: Point, less: float) -> Fit:
 
 
 def _fit_delay(plant: AxisPlant, name: str, point: Point) -> Fit:
-    """The fit of what delays the drive, beside the base parameters."""
-    delay = Free(name, "s", OF_DRIVE[name], np.inf, point[name], 0.1 * _period(plant))
+    """The fit of what delays a sensor or the drive, beside the base parameters."""
+    delay = Free(name, "s", LEAST[name], np.inf, point[name], 0.1 * _period(plant))
     return fit(plant, [*plant.base, delay], point, range(len(plant.blocks)))
 
 
@@ -247,11 +250,32 @@ def _period(plant: AxisPlant) -> float:
 
 
 def _widen_delay(plant: AxisPlant, outcome: Outcome) -> None:
-    """Let the interval of what delays the drive hold what it is with each way that the records do not rule out."""
-    for name in OF_DRIVE.keys() & outcome.point.keys():
+    """Let the interval of what delays a sensor or the drive hold what it is with each way that is not ruled out."""
+    for name in LEAST.keys() & outcome.point.keys():
         effect, parameter = name.split(".")
         told = [e["parameters"][parameter] for e in outcome.effects if e["name"] == effect]
         _widen_by_ways(plant, outcome, name, told)
+
+
+def _doubt_small_delay(plant: AxisPlant, outcome: Outcome) -> None:
+    """Halve what is sure of a delay within half a sample, where nothing but the drive and one sensor tells of it.
+
+    A current that settles before its next sample is ahead of a straight line by as much, and no way to take it knows
+    that.
+    """
+    if plant.plant.drive == "speed-loop":
+        return
+    seen = {name for b in plant.benches for name in b.roles.outputs} & set().union(*DELAYS.values())
+    names = [name for name, of in LEAST.items() if name in outcome.point and (name in OF_DRIVE or seen <= DELAYS[name])]
+    late = LATE[plant.between] + sum(outcome.point[name] for name in names) / _period(plant)
+    of = [e for e in outcome.effects if any(name.split(".")[0] == e["name"] for name in names)]
+    if abs(late) < HALF and of:
+        for e in of:
+            e["confidence"] *= CANNOT_TELL
+        side = "late" if late > 0.0 else "early"
+        outcome.notes.append(
+            f"the motion is {abs(late):.2g} samples {side}: that may also be what the drive does between samples"
+        )
 
 
 def _widen_by_ways(plant: AxisPlant, outcome: Outcome, name: str, told: list[dict[str, float]]) -> None:
@@ -266,14 +290,13 @@ def _widen_by_ways(plant: AxisPlant, outcome: Outcome, name: str, told: list[dic
         if not compare(tried[here], tried[way]).is_clear:
             for interval in told:
                 later = f.point[name] - fits[here].point[name]
-                interval["low"] = max(interval["low"] + min(later, 0.0), OF_DRIVE[name])
+                interval["low"] = max(interval["low"] + min(later, 0.0), LEAST[name])
                 interval["high"] += max(later, 0.0)
 
 
 def _shorten_delays(point: Point, by: float) -> Point:
     """The point with what delays it has shorter, as far as they go."""
-    least = {**dict.fromkeys(DELAYS, 0.0), **OF_DRIVE}
-    return {**point, **{name: max(point[name] - by, low) for name, low in least.items() if name in point}}
+    return {**point, **{name: max(point[name] - by, low) for name, low in LEAST.items() if name in point}}
 
 
 def _is_simpler(other: Outcome, one: Outcome) -> bool:
