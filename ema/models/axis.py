@@ -15,7 +15,7 @@ from ema.effects.torque_term import COLUMNS, NEUTRAL
 from . import axis_kernel as kernel
 from .axis_config import INSTANCE, LINES, Axis
 from .axis_layout import N_ROWS, row
-from .lag import follow
+from .lag import follow, precede
 
 Array = NDArray[np.float64]
 MODES = {
@@ -138,8 +138,12 @@ def _known(load: Array | None, t: Array) -> Array:
 
 
 def lag_of_drive(numbers: Model) -> float:
-    """Time constant with which what acts follows the recorded drive, by the clock of the record. [s]"""
-    return float(numbers.z[row("drive_lag.time")] / (1.0 + numbers.z[row("clock_skew.rate")]))
+    """Time constant with which what acts follows the recorded drive, by the clock of the record. [s]
+
+    Below zero it is that with which the recorded drive follows what acts.
+    """
+    lag, of_filter = (numbers.z[row(f"{name}.time")] for name in ("drive_lag", "drive_filter"))
+    return float((lag - of_filter) / (1.0 + numbers.z[row("clock_skew.rate")]))
 
 
 def clock_of_drive(numbers: Model) -> tuple[float, float]:
@@ -148,7 +152,9 @@ def clock_of_drive(numbers: Model) -> tuple[float, float]:
 
 
 def acting_drive(lag: float, t: Array, recorded: Array, between: str = "straight") -> Array:
-    """What acts of a recorded drive that is followed with a time constant; arguments as in `simulate`."""
+    """What acts of a recorded drive that is followed with a time constant, or follows; arguments as in `simulate`."""
+    if lag < 0.0:
+        return precede(t, recorded, -lag)
     return follow(t, recorded, lag, BETWEEN[between]) if lag > 0.0 else recorded
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ema.core.records import Array
+
 from . import jit  # noqa: F401  (sets the cache folder before anything is compiled)
 from .axis_kernel import HELD, STRAIGHT
 
@@ -45,3 +47,8 @@ def follow(t, u, time, between):
             out[k + 1] = u[k + 1] + (x - u[k + 1]) * mean
             x = u[k + 1] + fades * (x - u[k + 1])
     return out
+
+
+def precede(t: Array, u: Array, time: float) -> Array:
+    """What `u` follows with a `time` constant [s]: u + time u', with the slope between the neighbours of a sample."""
+    return np.asarray(u + time * np.gradient(u, t)) if len(u) > 1 else u

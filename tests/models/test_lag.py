@@ -38,6 +38,15 @@ def test_what_acts_is_the_drive_through_a_filter_of_the_first_order(between):
     np.testing.assert_allclose(axis.acting_drive(LAG, t, u, between), finely(t, u, between), atol=1e-6)
 
 
+def test_a_recorded_drive_that_was_filtered_is_what_acted_before():
+    """Smooth beside its samples, as a filter leaves it."""
+    t = np.arange(2000) * 2e-4
+    acted = np.sin(2.0 * np.pi * 20.0 * t) + 0.3 * np.sin(2.0 * np.pi * 60.0 * t)
+    recorded = finely(t, acted, "straight", n=50)
+    before = axis.acting_drive(-LAG, t, recorded)
+    np.testing.assert_allclose(before[100:-1], acted[100:-1], atol=0.01)
+
+
 def test_without_a_lag_it_is_the_drive():
     u = np.arange(3.0)
     assert axis.acting_drive(0.0, u, u) is u

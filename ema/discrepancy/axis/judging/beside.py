@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from ema.discrepancy.axis.finding.plant import AxisPlant
     from ema.discrepancy.axis.reading.windows import Bench
 
-OF_SENSORS = ("position_delay", "speed_delay", "clock_skew", "resolver_error", "encoder_error", "drive_lag")
+OF_SENSORS = (
+    *("position_delay", "speed_delay", "clock_skew", "resolver_error", "encoder_error"),
+    *("drive_lag", "drive_filter"),
+)
 
 
 def balance_beside(plant: AxisPlant, point: Point) -> Balance | None:
