@@ -77,6 +77,7 @@ POSITIVE = Limit("above 0", lambda x: x > 0.0)
 NOT_NEGATIVE = Limit("at least 0", lambda x: x >= 0.0)
 SOME_LEFT = Limit("above -1", lambda x: x > ABSENT)  # of a relative change
 SHARE = Limit("between -1 and 1", lambda x: abs(x) < 1.0)
+PART = Limit("between 0 and 1", lambda x: 0.0 <= x <= 1.0)
 NOT_REVERSED = Limit("at least -1", lambda x: x >= ABSENT)
 
 

@@ -22,7 +22,15 @@ import math
 
 from numba import njit
 
-from ema.effects import cogging, friction_memory, inverter_drop, registry, supply_sag, torque_term
+from ema.effects import (
+    cogging,
+    friction_memory,
+    inverter_drop,
+    output_load_friction,
+    registry,
+    supply_sag,
+    torque_term,
+)
 from ema.effects.dry_friction import rubbing_speed_after, speed_after
 
 from . import jit  # noqa: F401  (sets the cache folder before anything is compiled)
@@ -64,7 +72,8 @@ _beyond = ("compliance", "inertia", "damping", "drag", "friction")  # of what is
 AT_USER, AT_MOTOR = row("gear_compliance.compliance"), row("drive_compliance.compliance")
 assert [row(f"gear_compliance.{x}") - AT_USER for x in _beyond] == [0, 1, 2, 3, 4]
 assert [row(f"drive_compliance.{x}") - AT_MOTOR for x in _beyond] == [0, 1, 2, 3, 4]
-LOAD_SHARE, LOAD_SQUARE = row("output_load_friction.share"), row("quadratic_output_load_friction.per_torque")
+LOAD_SHARE, OF_INERTIA = row("output_load_friction.share"), row("output_load_friction.of_inertia")
+LOAD_SQUARE = row("quadratic_output_load_friction.per_torque")
 DEFLECTION, BRISTLE_DAMPING = row("friction_memory.deflection"), row("friction_memory.damping")
 SAG, V_DC = row("supply_sag.resistance"), row("V_dc")
 UNEVEN = tuple(row(f"inertia_by_angle.{p.name}") for p in registry()["inertia_by_angle"].parameters)
@@ -93,8 +102,8 @@ def is_uneven(z):
 
 
 @_inline
-def friction(z, lines, terms, theta, w, tau, tau_m, i, t):
-    """Static and sliding friction.   [N m or N]"""
+def friction(z, lines, terms, theta, w, tau, tau_m, i, t, moves):
+    """Static and sliding friction, of an axis that `moves` or is held.   [N m or N]"""
     direction = 1.0 if (w if w != 0.0 else tau) > 0.0 else -1.0
     drift = drifting_friction(z, 0, 1, t, z[DT])
     F_s = z[F_S] * drift * static_friction(z, 0, 1, theta, w, theta, direction, tau_m)
@@ -105,10 +114,13 @@ def friction(z, lines, terms, theta, w, tau, tau_m, i, t):
             F_s += more
             F_d += more
     if z[LOAD_SHARE] > 0.0 or z[LOAD_SQUARE] > 0.0:
-        load = abs(torques(z, lines, terms, theta, 0.0, i, t))
-        more = (z[LOAD_SHARE] + z[LOAD_SQUARE] * load) * load
-        F_s += more
-        F_d += more
+        load = torques(z, lines, terms, theta, 0.0, i, t)
+        square = z[LOAD_SQUARE] * load * load
+        passed = output_load_friction.passed_on(
+            load, tau - direction * (F_d + square), direction, z[LOAD_SHARE], z[OF_INERTIA] if moves else 0.0
+        )
+        F_s += z[LOAD_SHARE] * abs(load) + square
+        F_d += z[LOAD_SHARE] * passed + square
     return max(F_s, F_d, 0.0), max(F_d, 0.0)  # what keeps sliding at creep holds at rest
 
 
@@ -322,7 +334,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide
                 w_b += dw_b
                 theta_b += 0.5 * h * w_b
             w_sliding = w_mid if slide == 0.0 else slide * max(w_mid * slide, CREEP)
-            F_s, F_d = friction(z, lines, terms, theta_mid, w_sliding, tau, tau_m, i, t_mid)
+            F_s, F_d = friction(z, lines, terms, theta_mid, w_sliding, tau, tau_m, i, t_mid, True)
             if friction_memory.is_slow(F_d, deflection, J_now, h):
                 bristle = friction_memory.built_up(bristle, 0.5 * h * w, deflection)
                 tau -= friction_memory.torque(bristle, w, F_d, deflection, z[BRISTLE_DAMPING], J_now)
@@ -387,7 +399,7 @@ def holding_current(z, lines, terms, theta, direction, t, load, out):
         i, z[LOAD] = 0.0, load[k]
         for _ in range(3):  # the torque constant and load-dependent friction depend on the current they decide
             k_t = z[K_T] * emf_factor(z, 0, 1, i, z[DT])
-            _, F_d = friction(z, lines, terms, theta[k], direction[k] * 1e-9, 0.0, k_t * i, i, t[k])
+            _, F_d = friction(z, lines, terms, theta[k], direction[k] * 1e-9, 0.0, k_t * i, i, t[k], False)
             i = (torques(z, lines, terms, theta[k], direction[k] * 1e-9, i, t[k]) + F_d * direction[k]) / k_t
         out[k] = i * (1.0 + z[GAIN]) + z[OFFSET]
 
@@ -432,7 +444,7 @@ def torque_along(z, lines, terms, theta, w, i, t, dT, load, is_force, out):
         tau_m = i[k] if is_force else z[K_T] * emf_factor(z, 0, 1, i[k], z[DT]) * i[k]
         tau = tau_m - torques(z, lines, terms, theta[k], w[k], i[k], t[k])
         tau += 0.5 * inertia * inertia_slope(z, 0, 1, theta[k]) * w[k] * w[k]
-        _, F_d = friction(z, lines, terms, theta[k], w[k], tau, tau_m, i[k], t[k])
+        _, F_d = friction(z, lines, terms, theta[k], w[k], tau, tau_m, i[k], t[k], True)
         if z[DEFLECTION] == 0.0 or (k > 0 and t[k] < t[k - 1]):
             bristle = 1.0 if w[k] > 0.0 else -1.0
         elif k > 0:

@@ -65,3 +65,15 @@ def test_friction_by_the_load_at_the_output_knows_the_load():
     zero, load = np.zeros(2), np.array([LOAD, LOAD])
     left = axis.torque_along(numbers, zero, w, zero, np.arange(2.0), zero, load)
     np.testing.assert_allclose(left, -LOAD - share * LOAD * np.sign(w), rtol=1e-9)
+
+
+@pytest.mark.parametrize("of_inertia", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("torque", [0.3, -0.3])
+def test_what_a_gear_loses_of_the_inertia_s_torque_slows_the_acceleration(of_inertia, torque):
+    """J α = τ - load - c |load + ε J α| forwards, + c |…| backwards: the α that the simulation has solves it."""
+    share = 0.2
+    effects = {"output_load_friction": {"share": share, "of_inertia": of_inertia}}
+    out = run(np.full(len(T), torque / K_T), np.full(len(T), LOAD), effects=effects)
+    alpha = np.diff(out[1])[10:] / np.diff(T)[10:]
+    passed_on = LOAD + of_inertia * J * alpha
+    np.testing.assert_allclose(J * alpha, torque - LOAD - np.sign(torque) * share * np.abs(passed_on), rtol=1e-6)

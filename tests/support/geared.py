@@ -36,6 +36,7 @@ class Axis:
     by_square: float = 0.0  # [1/(N m)] friction over motor torque squared
     gravity: float = 0.0  # [N m] of a load that hangs at the shaft, at the horizontal
     by_load: float = 0.0  # friction over that load
+    passed_on: float = 0.0  # share of J whose torque the gear passes on, and loses as much of
     by_load_square: float = 0.0  # [1/(N m)] and over its square
     dry_slope: float = 0.0  # [1/rad] of F along the travel
     viscous_slope: float = 0.0  # [1/rad] of C
@@ -53,10 +54,10 @@ class Axis:
 @njit(cache=True)
 def _run(reference, hz, p, of_load, along, warm, lines, loop, out):
     J, F, C, k_t, bristle, dry_k, activation, dry_rate, viscous_rate, by_square, flux, unequal, saturation, lag = p
-    gravity, by_load, by_load_square = of_load
+    gravity, by_load, by_load_square, passed_on = of_load
     dry_slope, viscous_slope, stiffness, hardens = along
     K_p, K_w = loop
-    theta, w, z, acts = reference[0], 0.0, 0.0, 0.0
+    theta, w, z, acts, before = reference[0], 0.0, 0.0, 0.0, 0.0
     dt = 1.0 / (hz * FINE)
     for k in range(len(reference)):
         ahead = (reference[min(k + 1, len(reference) - 1)] - reference[max(k - 1, 0)]) * hz / 2
@@ -74,7 +75,8 @@ def _run(reference, hz, p, of_load, along, warm, lines, loop, out):
             for n in range(lines.shape[0]):
                 other += lines[n, 0] * np.sin(lines[n, 1] * theta + lines[n, 2])
             rubs = dry * (1.0 + dry_slope * theta) + by_square * motor * motor
-            rubs += by_load * abs(load) + by_load_square * load * load
+            rubs += by_load * abs(load + passed_on * J * (w - before) / dt) + by_load_square * load * load
+            before = w
             if bristle > 0.0:
                 stiff = rubs / bristle
                 dz = w - abs(w) * z / bristle
@@ -107,7 +109,7 @@ def record(
         *(axis.dry_rate, axis.viscous_rate, axis.by_square, axis.flux_per_kelvin, axis.unequal),
         *(axis.saturation, axis.lag),
     )
-    of_load = (axis.gravity, axis.by_load, axis.by_load_square)
+    of_load = (axis.gravity, axis.by_load, axis.by_load_square, axis.passed_on)
     along = (axis.dry_slope, axis.viscous_slope, *axis.spring)
     _run(reference, axis.hz, p, of_load, along, warm, np.array(axis.lines, float).reshape(-1, 3), loop, out)
     theta, w, i = (x + s * rng.standard_normal(n) for x, s in zip(out, axis.noise, strict=True))

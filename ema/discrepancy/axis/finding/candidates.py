@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ema.discrepancy.axis.reading.measured import Measured
 
 PRIOR = 0.5  # standard deviation of a fitted parameter about the plant file's value, relative
-SHAPES = ("roundness",)  # of a law
+SHAPES = ("roundness", "of_inertia")  # of a law, whose ends are those of the effect
 BASE_RANGE = 20.0  # a fitted parameter stays within this factor of the plant file's value
 
 

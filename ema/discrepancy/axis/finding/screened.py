@@ -27,7 +27,7 @@ from ema.effects import registry
 from ema.effects.position_line import EFFECT as POSITION_LINE
 from ema.models.axis_config import LINES, Axis
 
-from .candidates import PRIOR
+from .candidates import PRIOR, SHAPES
 
 SCREENED = (
     *("viscous_by_direction", "pendulum", "output_load_friction", "drive_unequal", "viscous_slope", "friction_slope"),
@@ -124,8 +124,10 @@ def _candidate(name: str, values: dict[str, float], unsure: dict[str, float]) ->
     for p in effect.parameters:
         if p.name in FIXED:
             continue
-        value = values[p.name]
-        if p.name == "phase":
+        value = values.get(p.name, p.neutral)
+        if p.name in SHAPES:
+            free.append(Free(f"{name}.{p.name}", p.unit, p.low, p.high, value, 0.2 * (p.high - p.low), is_shape=True))
+        elif p.name == "phase":
             free.append(Free(f"{name}.{p.name}", p.unit, value - np.pi, value + np.pi, value, 0.1))
         else:
             size = max(abs(value), unsure.get(p.name, 0.0))
@@ -135,5 +137,5 @@ def _candidate(name: str, values: dict[str, float], unsure: dict[str, float]) ->
             key = f"{name}.{p.name}"
             prior = PRIOR * size if key in VAGUE else None
             free.append(Free(key, p.unit, low, ROOM * size, value, 0.1 * size, prior=prior))
-    start = {f"{name}.{key}": value for key, value in values.items()}
+    start = {f.name: f.start for f in free} | {f"{name}.{key}": value for key, value in values.items()}
     return Candidate(name, name, tuple(free), (start,))

@@ -133,7 +133,7 @@ def _by_load(u: Units) -> Iterator[Law]:
             name,
             _share(side, 1),
             {"share": "1"},
-            one("share"),
+            one("share", of_inertia=float(side == "load")),
             f"friction grows with {what}, by {{share:.3g}} of it",
             "the same motion with different loads",
             is_friction=True,

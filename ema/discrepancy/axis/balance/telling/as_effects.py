@@ -167,7 +167,7 @@ def _flux_ripple(v: Values, F_d: float, k_t: float) -> Effects:
 _MAKERS: Mapping[str, _Maker] = {
     "viscous_by_direction": _as_it_is("viscous_by_direction", "difference"),
     "pendulum": _as_it_is("pendulum", "amplitude", "phase", "turns"),
-    "output_load_friction": _as_it_is("output_load_friction", "share"),
+    "output_load_friction": _as_it_is("output_load_friction", "share", "of_inertia"),
     "quadratic_output_load_friction": _as_it_is("quadratic_output_load_friction", "per_torque"),
     "quadratic_load_friction": _of_friction("quadratic_load_friction", "per_square", "per_torque"),
     "friction_memory": _as_it_is("friction_memory", "deflection"),
