@@ -52,17 +52,19 @@ def check(files: tuple[Path, ...], plant: Path | None, picture: Path | None, as_
     from ema.core.records import each_once, read_record
     from ema.discrepancy.records import agreements, channels, list_allowed, sampling
 
-    from .plans import axis_of, plan_of
+    from .plans import axis_of, kind_of, plan_of
 
     if picture is not None and require_new(picture, "choose another --picture").suffix.lower() not in PICTURES:
         raise ConfigError(f"{picture}: must end in .svg, .png or .pdf")
     plan = None if plant is None else plan_of(plant)
     axis = None if plant is None else axis_of(plant)
+    kind = None if plant is None else kind_of(plant)
     found, answers = [], []
     for path in each_once(files):
         record = read_record(path, plan)
         clock, facts, agree = sampling(record), channels(record), agreements(record)
         able = list_allowed(record, clock, facts, agree, axis)
+        able = able if kind is None else able.only(kind)
         found.append(record)
         answers.append((record, clock, facts, agree, able))
     if as_json:
@@ -78,7 +80,7 @@ def check(files: tuple[Path, ...], plant: Path | None, picture: Path | None, as_
     useless = [record.name for record, *_, able in answers if not able.plants or able.refused]
     if useless:
         raise NegativeAnswer(
-            f"{', '.join(useless)}: enough for {'no plant' if axis is None else f'no search by {plant}'}"
+            f"{', '.join(useless)}: enough for {'no plant' if plant is None else f'no search by {plant}'}"
         )
 
 

@@ -27,9 +27,9 @@ def _lines(effects: list[Effect]) -> Iterator[str]:
     yield ""
     yield "What `ema discrepancy` can name, and what a plant file may hold under `effects:` ([another plant](axis.md),"
     yield "[the actuator](discrepancy.md)). At the value in *off* a plant is as without the effect. What lies beyond"
-    yield "*searched* may be written into a plant file, but is not looked for on an actuator; on an axis a search goes as"
-    yield "far as the sizes in its records ask. `ema discrepancy --explain NAME` tells of one of them why it is not the"
-    yield "answer. An indented line is what is simulated, as its file says it."
+    yield "*searched* may be written into a plant file, but is not looked for on an actuator; on an axis a search goes"
+    yield "as far as the sizes in its records ask. `ema discrepancy --explain NAME` tells of one of them why it is not"
+    yield "the answer. An indented line is what is simulated, as its file says it."
     for effect in effects:
         yield ""
         yield f"## {effect.name}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,6 +35,12 @@ class Allowed:
     missing: dict[str, list[str]]
     obstacles: list[str]
     refused: str = ""
+
+    def only(self, kind: str) -> Allowed:
+        """The same of one kind of plant."""
+        plants = {own: what for own, what in self.plants.items() if own == kind}
+        missing = {own: what for own, what in self.missing.items() if own == kind}
+        return replace(self, plants=plants, missing=missing)
 
 
 def list_allowed(
@@ -70,9 +76,9 @@ def list_allowed(
     if plant is not None:
         drive, refused = _take(plant, record)
         drives = [drive] if drive else drives
-        plants.pop("ema", None)
-        missing.pop("ema", None)
-        if drive and plants:
+        if refused:
+            plants.pop("axis", None)
+        elif "axis" in plants:
             plants["axis"] = f"{plants['axis'].partition(', driven by')[0]}, driven by {drive}"
     disagreeing = [f"{one.what}: {one.said}" for one in agree if not one.is_fine]
     facts = [one for one in facts if not (record.is_at_rest and one.name in ("w_m", "v"))]

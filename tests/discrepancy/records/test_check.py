@@ -11,6 +11,7 @@ from plain_axis import RATE, bench
 
 from ema.cli import cli
 from ema.core.csv_records import write_csv
+from ema.core.errors import ConfigError, NegativeAnswer
 from ema.core.records import Cycle, Record
 from ema.discrepancy.records import channels
 
@@ -137,3 +138,19 @@ def test_the_turns_of_a_coarse_encoder_are_no_limit(tmp_path):
     for motion, is_held in ((turning, False), (np.clip(turning, None, 0.9), True)):
         cycle = Cycle(0, {**record.cycles[0].channels, "theta_m": motion})
         assert (facts_of(Record((cycle,)))["theta_m"].held > 0.0) is is_held
+
+
+@pytest.mark.parametrize(
+    ("plant", "raised", "words"),
+    [
+        ("kind: axis\nmotion: linear\nM: 2\nF_d: 1\ndrive: force\n", NegativeAnswer, "enough for no search by"),
+        ("kind: axis\nJ: heavy\nF_d: 1\n", ConfigError, "'J' = 'heavy'"),
+        ("kind: axle\n", ConfigError, "must be one of ema, axis"),
+    ],
+)
+def test_a_record_is_held_against_its_plant_file(plant, raised, words, tmp_path):
+    write_csv(bench(), tmp_path / "x.csv")
+    (tmp_path / "plant.yaml").write_text(plant)
+    words_of = ["records", "check", str(tmp_path / "x.csv"), "--plant", str(tmp_path / "plant.yaml")]
+    with pytest.raises(raised, match=words):
+        CliRunner().invoke(cli, words_of, catch_exceptions=False)
