@@ -308,7 +308,7 @@ def _loop(kind: str, plant_file: dict[str, Any], record: Record, values: dict[st
 
 # Shares of all trials, and what makes one.
 STRATA: dict[str, tuple[float, Callable[[int, int, str], Trial]]] = {
-    "nothing": (0.13, _nothing), "one effect": (0.22, _one), "law, cascaded loops": (0.21, _law),
+    "nothing": (0.13, _nothing), "one effect": (0.22, _one), "law, cascaded loops": (0.22, _law),
     "two effects": (0.1, _two), "three effects": (0.05, _three), "outside the library": (0.08, _outside),
     "recorder": (0.07, _spoiled), "other makers": (0.07, _other), "loops": (0.07, _loops),
 }  # fmt: skip

@@ -163,22 +163,30 @@ def _reads_too_much(a: geared.Axis, rng: Rng) -> Hidden:
     return Hidden(a, truth, ("drive_gain",), spoil=torque, plant_file=declared)
 
 
-def _filtered(a: geared.Axis, rng: Rng) -> Hidden:
-    """A speed through a first-order filter."""
-    late = rng.uniform(3e-3, 1e-2)
+def _through(name: str, late: float, noise: float, *, is_held: bool = False) -> Callable[[Record], Record]:
+    """A channel through a filter of the first order before it is recorded; one that is held acts from its sample on."""
 
     def through(record: Record) -> Record:
         (cycle,) = record.cycles
-        w = np.empty(cycle.n_samples)
-        y = float(cycle["w_m"][0])
-        share = -np.expm1(-cycle.period / late)
-        for k, x in enumerate(cycle["w_m"]):
+        given = np.append(cycle[name][:1], cycle[name][:-1]) if is_held else cycle[name]
+        out = np.empty(cycle.n_samples)
+        y, share = float(given[0]), -np.expm1(-cycle.period / late)
+        for k, x in enumerate(given):
             y += share * (float(x) - y)
-            w[k] = y
-        w += a.noise[1] * np.random.default_rng(cycle.n_samples).standard_normal(len(w))
-        return Record((Cycle(0, {**cycle.channels, "w_m": w}),))
+            out[k] = y
+        out += noise * np.random.default_rng(cycle.n_samples).standard_normal(len(out))
+        return Record((Cycle(0, {**cycle.channels, name: out}),))
 
-    return Hidden(a, effects=(FILTERED,), spoil=through)
+    return through
+
+
+def _filtered_speed(a: geared.Axis, rng: Rng) -> Hidden:
+    return Hidden(a, effects=(FILTERED,), spoil=_through("w_m", rng.uniform(3e-3, 1e-2), a.noise[1]))
+
+
+def _filtered_current(a: geared.Axis, rng: Rng) -> Hidden:
+    late = rng.uniform(2e-3, 6e-3)
+    return Hidden(a, {"drive_filter.time": late}, spoil=_through("i_q", late, a.noise[2], is_held=True))
 
 
 def _slope(name: str, field_: str) -> Callable[[geared.Axis, Rng], Hidden]:
@@ -222,10 +230,11 @@ HIDDEN: dict[str, Callable[[geared.Axis, Rng], Hidden]] = {
     "cogging": _cogging,
     "external_torque": _external,
     "torque_reads_too_much": _reads_too_much,
-    "speed_filtered": _filtered,
+    "speed_filtered": _filtered_speed,
     "friction_slope": _slope("friction_slope", "dry_slope"),
     "viscous_slope": _slope("viscous_slope", "viscous_slope"),
     "drive_unequal": _unequal,
     "hardening_spring": _hardening,
     "drive_lag": _slow_current,
+    "drive_filter": _filtered_current,
 }
