@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from ema.core.sidecar import Sidecar
     from ema.discrepancy.findings import Findings
 
-# Which module examines which kind of plant.
-EXAMINERS = {"ema": "ema.discrepancy.actuator.examine", "axis": "ema.discrepancy.axis.examine"}
 N_LEADING = 3  # sets that are told
 
 
@@ -58,7 +56,7 @@ def discrepancy(
     from ema.discrepancy.explaining import explain_cause, read_findings
 
     from .integrity import tell
-    from .plans import kind_of, plan_of
+    from .plans import EXAMINERS, kind_of, plan_of
 
     if explain is not None and not records:
         click.echo(explain_cause(read_findings(out), explain))

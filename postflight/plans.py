@@ -12,7 +12,8 @@ from ema.core.sidecar import Sidecar
 if TYPE_CHECKING:
     from ema.models.axis_config import Axis
 
-KINDS = ("ema", "axis")
+# Which module examines which kind of plant.
+EXAMINERS = {"ema": "ema.discrepancy.actuator.examine", "axis": "ema.discrepancy.axis.examine"}
 
 
 def plan_of(plant_file: Path) -> Sidecar | None:
@@ -24,8 +25,8 @@ def plan_of(plant_file: Path) -> Sidecar | None:
 def kind_of(plant_file: Path) -> str:
     """`ema` or `axis`; ConfigError where the file says neither."""
     kind = config.read_yaml(plant_file).get("kind")
-    if kind not in KINDS:
-        raise ConfigError(f"{plant_file}: key 'kind' = {kind!r}: must be one of {', '.join(KINDS)}")
+    if kind not in EXAMINERS:
+        raise ConfigError(f"{plant_file}: key 'kind' = {kind!r}: must be one of {', '.join(EXAMINERS)}")
     return str(kind)
 
 

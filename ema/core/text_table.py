@@ -116,11 +116,7 @@ def _is_numeric(line: str) -> bool:
 
 
 def _is_number(field: str) -> bool:
-    try:
-        float(field)
-    except ValueError:
-        return False
-    return True
+    return Dialect(",", ".").is_number(field)
 
 
 def _dialect(texts: list[str], side: Sidecar) -> Dialect:

@@ -104,12 +104,13 @@ def rate(runs: Sequence[Sequence[Array]], more: Sequence[Sequence[Array]] = ()) 
     """
     scale = min(scale_of(r) for r in runs)
     rates = [float(sum(s.sum() for s in log_likelihood(r, scale))) for r in runs]
-    return [own + _given_back(d, scale) for own, d in zip(rates, more, strict=True)] if more else rates
+    back = [float(sum(s.sum() for s in given_back(d, scale))) for d in more]
+    return [own + its for own, its in zip(rates, back, strict=True)] if back else rates
 
 
-def _given_back(more: Sequence[Array], scale: float) -> float:
-    """Half the squares that noise of the drive makes of a residual, at its scale. [nats]"""
-    return float(sum(0.5 * (d**2).sum() for d in more) / scale**2)
+def given_back(more: Sequence[Array], scale: float) -> list[Array]:
+    """Half the squares that noise of the drive makes of a residual, per sample of each block, at its scale. [nats]"""
+    return [0.5 * np.sum(d**2, axis=0) / scale**2 for d in more]
 
 
 def add_by_noise(plant: Plant, point: Point, blocks: Sequence[int], residuals: Sequence[Array]) -> list[Array]:
@@ -232,30 +233,34 @@ class _Objective:
     def by_noise(self, J: Array) -> Array:
         """Covariance of the free parameters, were noise all that is left."""
         Js, own = J * self.scales, self.prior_slopes * self.scales
-        found = self._sandwiched(Js, own.T @ own)
+        found, *_ = self._sandwiched(Js, own.T @ own)
         return np.asarray(found * np.outer(self.scales, self.scales))
 
-    def _sandwiched(self, Js: Array, known: Array) -> Array:
-        """Covariance where the residual's rows have unit noise: as for errors in the regressors."""
+    def _sandwiched(self, Js: Array, known: Array) -> tuple[Array, Array, Array]:
+        """Covariance where the residual's rows have unit noise, as for errors in the regressors; and its normal matrix.
+
+        That one last, after its inverse.
+        """
         of_r, of_d = Js[: self.n_rows], Js[self.n_rows :]
-        A = of_r.T @ of_r
-        inverse = np.linalg.pinv(_less(A, of_d.T @ of_d) + known, rcond=1e-12, hermitian=True)
-        return np.asarray(inverse @ (A + known) @ inverse)
+        gram = of_r.T @ of_r
+        A = _less(gram, of_d.T @ of_d) + known
+        inverse = np.asarray(np.linalg.pinv(A, rcond=1e-12, hermitian=True), np.float64)
+        return np.asarray(inverse @ (gram + known) @ inverse), inverse, A
 
     def covariance(self, J: Array, rows: Array, residuals: Sequence[Array], scale: float) -> Array:
         """Of the free parameters, where residuals have this scale; each as wide as blocks disagree on it, at least."""
         Js = J * self.scales
         own = self.prior_slopes * self.scales * scale  # the prior is not loosened by a poor residual
-        found = self._sandwiched(Js, own.T @ own) * scale**2
+        unit, inverse, A = self._sandwiched(Js, own.T @ own)
+        found = unit * scale**2
         of_r, of_d = Js[: self.n_rows], Js[self.n_rows :]
-        A = _less(of_r.T @ of_r, of_d.T @ of_d) + own.T @ own
         r, d = np.clip(rows[: self.n_rows], -HUBER * scale, HUBER * scale), rows[self.n_rows :]
         ends = pairwise(np.cumsum([0, *(block.size for block in residuals)]).tolist())
         parts = ((of_r[a:b], r[a:b], of_d[a:b], d[a:b]) for a, b in ends)
         grams = ((P.T @ P - Q.T @ Q, P.T @ own_r - Q.T @ own_d) for P, own_r, Q, own_d in parts)
         shown = left_out.covariance(A, grams, LEAST)
         wider = np.sqrt(np.maximum(np.diag(shown) / np.maximum(np.diag(found), 1e-300), 1.0))
-        by = KNOWN_TO * np.linalg.pinv(A, rcond=1e-12, hermitian=True) @ (of_d.T @ d)  # were there as much more of it
+        by = KNOWN_TO * inverse @ (of_d.T @ d)  # were there as much more of it
         found = found * np.outer(wider, wider) + np.outer(by, by)
         return np.asarray(found * np.outer(self.scales, self.scales))
 
@@ -345,9 +350,6 @@ def best_fit(
     if len(starts) > 1:
         starts = [starts[j] for j in np.argsort(rate(plant.residuals(starts, blocks)))[::-1][:n_fits]]
     fits = [fit(plant, free, s, blocks, max_iterations=max_iterations, frozen=frozen) for s in starts]
-    return fits[0] if len(fits) == 1 else fits[int(np.argmax(rate_fits(fits)))]
-
-
-def rate_fits(fits: Sequence[Fit]) -> list[float]:
-    """Log-likelihood of several fits to the same blocks."""
-    return rate([f.residuals for f in fits], [f.more for f in fits] if fits[0].more else ())
+    if len(fits) == 1:
+        return fits[0]
+    return fits[int(np.argmax(rate([f.residuals for f in fits], [f.more for f in fits])))]

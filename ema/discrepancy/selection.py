@@ -10,7 +10,7 @@ import numpy as np
 
 from ema.core.records import Array
 
-from .fitting import Fit, add_by_noise, best_fit, fit, log_likelihood, rate, scale_of, slopes
+from .fitting import Fit, add_by_noise, best_fit, fit, given_back, log_likelihood, rate, scale_of, slopes
 from .plant import Block, Candidate, Plant, Point
 
 N_FOLDS = 2
@@ -132,8 +132,7 @@ def log_scores(tried: Tried, scale: float) -> Array:
     n = max(1, -(-MIN_PARTS // max(len(tried.held_out), 1)))
     blocks = log_likelihood(tried.held_out, scale)
     if tried.by_noise:
-        more = (0.5 * np.sum(d**2, axis=0) / scale**2 for d in tried.by_noise)
-        blocks = [own + given_back for own, given_back in zip(blocks, more, strict=True)]
+        blocks = [own + back for own, back in zip(blocks, given_back(tried.by_noise, scale), strict=True)]
     return np.array([float(part.sum()) for block in blocks for part in np.array_split(block, n)])
 
 
@@ -180,8 +179,8 @@ def _help_by_other_folds(plant: Plant, own: Fit, fits: Sequence[Fit]) -> Fit:
         if other is own or [f.name for f in other.free] != names or not names:
             continue
         residuals = plant.residuals([other.point], own.blocks)[0]
-        more = (own.more, add_by_noise(plant, other.point, own.blocks, residuals)) if own.more else ()
-        here, there = rate([own.residuals, residuals], more)
+        more = add_by_noise(plant, other.point, own.blocks, residuals)
+        here, there = rate([own.residuals, residuals], [own.more, more])
         if there > here + BETTER:
             own = fit(plant, own.free, other.point, own.blocks)
     return own

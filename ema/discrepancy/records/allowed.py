@@ -9,6 +9,7 @@ import numpy as np
 from ema.core.errors import RecordError
 from ema.core.names import CHANNELS, CURRENTS
 from ema.core.records import Record
+from ema.discrepancy.axis.reading import noise
 from ema.discrepancy.axis.reading.channels import LOAD_CHANNEL, LOOP_CHANNELS, roles
 from ema.discrepancy.axis.reading.intake import take_in
 from ema.discrepancy.axis.reading.undersampled import refuse_undersampled
@@ -18,7 +19,7 @@ from .agreements import Agreement
 from .facts import FALLEN, ChannelFacts, Sampling
 
 ACTUATOR = ("t", *CURRENTS, "theta_m", "theta_u", "theta_cmd")
-DRIVES = ("torque", "force", "i_q", "u_q", "duty", "w_ref")  # the first of them that is there drives
+DRIVES = (*noise.DRIVES, "w_ref")
 FEW = 500  # samples of a record from which a fit has something left to be tested with
 DUTY = 1.1  # largest duty cycle, with what a converter may add
 JITTERY = 0.2  # of a period, rms

@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 
 from ema.core.records import Array, Cycle
 
-DRIVES = ("i_q", "torque", "force", "u_q", "duty")  # may be commands
+DRIVES = ("torque", "force", "i_q", "u_q", "duty")  # may be commands; the first of them that is there drives
 LEVELS = 5  # values up to which a channel goes between levels
 N_BINS = 8
 MAX_SAMPLES = 4000  # of a cycle, to see how a channel was made
