@@ -82,3 +82,15 @@ def test_memory_keeps_no_more_than_it_may_and_forgets_the_longest_unused():
     memory.keep(runs[2:], Runs(made.features[2:], made.envelopes[2:]))
     np.testing.assert_array_equal(memory.recall([runs[2], runs[0]]).features.ravel(), [2.0, 0.0])
     assert memory.unknown([*runs, runs[1]]) == [runs[1]]
+
+
+def test_a_control_period_that_no_usual_step_divides_is_simulated(shipped_plant, hidden):
+    """At 8 kHz 0.8 µs do not, and such records were refused."""
+    rate = 8000.0
+    plant = shipped_plant.model_copy(update={"control": shipped_plant.control.model_copy(update={"rate": rate})})
+    (cycle,) = hidden.cycles(hidden.Flaws(), 1, 3, (hidden.chirp(duration=0.22),))
+    slower = {**cycle, "t": np.arange(len(cycle["t"])) / rate}
+    ema = EmaPlant(plant, prepare(plant, [Record((Cycle(0, slower),))]), 1)
+    (mean,) = ema.means([{}], [0], 2, 50)
+    assert np.isfinite(mean[0]).all()
+    assert ema.work.steps == (len(cycle["t"]) - 1) * (125 + 156)

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ema.discrepancy.actuator.simulating.noise import Noise
-from ema.discrepancy.actuator.simulating.plant import NOISE_STEPS, STEPS, EmaPlant
+from ema.discrepancy.actuator.simulating.plant import NOISE_STEPS, STEPS, EmaPlant, dividing
 from ema.discrepancy.plant import Point
 
 from .fit import excess_at, misfit_at
@@ -79,14 +79,10 @@ def take_step(plant: EmaPlant, step: float | None) -> None:
     """Simulate with this step from now on, and where noise is asked for with its neighbours; None: with the usual."""
     plant.step = step
     plant.steps = STEPS if step is None else (step,)
-    plant.noise_steps = NOISE_STEPS if step is None else tuple(_dividing(plant, step * factor) for factor in AROUND)
+    plant.noise_steps = (
+        NOISE_STEPS if step is None else tuple(dividing(plant.plant, step * factor) for factor in AROUND)
+    )
 
 
 def _steps(plant: EmaPlant, about: Sequence[float]) -> list[float]:
-    return [_dividing(plant, step) for step in about]
-
-
-def _dividing(plant: EmaPlant, about: float) -> float:
-    """The step nearest to `about` of which a whole number makes a control period. [s]"""
-    T = 1.0 / plant.plant.control.rate
-    return T / round(T / about)
+    return [dividing(plant.plant, step) for step in about]

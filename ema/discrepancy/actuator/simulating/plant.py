@@ -30,11 +30,18 @@ from ema.models.layout import STATE
 from .runs import Asked, Memory, Runs, Work
 
 Steps = tuple[float, ...] | None  # None: the plant's
-STEPS = (1e-6, 8e-7)  # [s] integration steps of a mean
-NOISE_STEPS = (1e-6, 5e-7, 8e-7, 2e-6)  # [s] integration steps of runs that tell the noise
+# [s] Integration steps of a mean, and of runs that tell the noise; of all, the nearest that divide a control period.
+STEPS = (1e-6, 8e-7)
+NOISE_STEPS = (1e-6, 5e-7, 8e-7, 2e-6)
 CHUNK = 64  # runs that a thread has in memory at a time
 CARRIED = 0.03  # [A] at the start, that tells that comparators are switching
 ENVELOPE_STEP = 10  # the envelope is low-passed at 200 Hz: every tenth sample says all
+
+
+def dividing(plant: Actuator, about: float) -> float:
+    """The step nearest to `about` of which a whole number makes a control period. [s]"""
+    T = 1.0 / plant.control.rate
+    return T / round(T / about)
 
 
 class EmaPlant:
@@ -94,7 +101,7 @@ class EmaPlant:
 
         Integration steps take turns with the seeds: what is rounded alike in every run with one step averages out.
         """
-        steps = steps or self.steps
+        steps = [dividing(self.plant, step) for step in steps or self.steps]
         named = {id(point): self._not_neutral(point) for point in points}
         asked = [
             Asked(named[id(point)], cycle, seed, steps[(seed - seeds[0]) % len(steps)], self.late, self.data.zero)
