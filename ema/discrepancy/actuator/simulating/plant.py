@@ -101,16 +101,16 @@ class EmaPlant:
 
         Integration steps take turns with the seeds: what is rounded alike in every run with one step averages out.
         """
-        steps = [dividing(self.plant, step) for step in steps or self.steps]
+        taken = [dividing(self.plant, step) for step in steps or self.steps]
         named = {id(point): self._not_neutral(point) for point in points}
         asked = [
-            Asked(named[id(point)], cycle, seed, steps[(seed - seeds[0]) % len(steps)], self.late, self.data.zero)
+            Asked(named[id(point)], cycle, seed, taken[(seed - seeds[0]) % len(taken)], self.late, self.data.zero)
             for point, cycle, seed in zip(points, cycles, seeds, strict=True)
         ]
         new = sorted(self.memory.unknown(asked), key=lambda run: run.alike)
         jobs = [
             same[at : at + CHUNK]
-            for same in ([run for run in new if run.dt == dt] for dt in dict.fromkeys(steps))
+            for same in ([run for run in new if run.dt == dt] for dt in dict.fromkeys(taken))
             for at in range(0, len(same), CHUNK)
         ]
         # One step often fills one batch of lanes only, which takes one core: the steps run side by side.
