@@ -76,8 +76,11 @@ def discrepancy(
     if as_json:
         click.echo(files[0].read_text(encoding="utf-8"), nl=False)
     else:
+        click.echo(f"Verdict: {findings.verdict}.")
         for sentence in findings.sentences(numbers=True):
             click.echo(sentence)
+        if findings.gain.told_faults:
+            click.echo(findings.gain.told_faults)
         for line in list_leading(findings):
             click.echo(line)
         if findings.next_recording:

@@ -30,16 +30,24 @@ def _lines(effects: list[Effect]) -> Iterator[str]:
     yield "*searched* may be written into a plant file, but is not looked for on an actuator; on an axis a search goes"
     yield "as far as the sizes in its records ask. `ema discrepancy --explain NAME` tells of one of them why it is not"
     yield "the answer. An indented line is what is simulated, as its file says it."
+    for plant, name in PLANTS.items():
+        own = [effect.name for effect in effects if plant in effect.plants]
+        yield ""
+        yield f"**Of an {name}** ({len(own)}): {', '.join(f'[{e}](#{e})' for e in own)}."
     for effect in effects:
         yield ""
         yield f"## {effect.name}"
         yield ""
-        said = (import_module(f"ema.effects.{effect.name}").__doc__ or "").split("\n\n")[0].replace("\n", " ")
+        said, *more = (import_module(f"ema.effects.{effect.name}").__doc__ or "").strip().split("\n\n")
+        said = said.replace("\n", " ")
         plants = " and ".join(PLANTS[plant] for plant in effect.plants)
         yield f"{said} Acts on {PLACES[effect.place]}; {plants}. Told from others by {effect.separated_by}."
         faults = [name for name in effect.mistaken_for if name in FAULTS]
         if faults and "ema" in effect.plants:
             yield f"A monitor without it would report {', '.join(faults)}."
+        for paragraph in more:
+            yield ""
+            yield paragraph.replace("References\n----------\n", "*References.* ")
         if effect.is_table:
             yield "A table of values, of no known cause."
             continue

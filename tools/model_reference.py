@@ -22,10 +22,12 @@ discrepancy`; `ema simulate` makes one to lay beside yours."""
 ORDER = """\
 The controller works at `control.rate`: at each tick it samples the user's position (noise, then rounding to
 `sensors.lvdt_step`), the rotor's angle and speed, which are exact, and the command, and holds its reference current
-until the next. In the same moment the record is taken. The comparators act in between, at no clock: the model finds
-where in a step of a microsecond a current leaves its band. Recorded currents go through two first-order stages of
-`sensors.f_lag` each, get noise of `sensors.current_noise` and are rounded to the converter's step (`adc_range`,
-`adc_bits`); the comparators see them as they are. A cycle begins at rest."""
+(one number, not three phases) until the next. In the same moment the record is taken. In between, in each step of a
+microsecond, the rotor's angle decides which phases carry that current, and the comparators ask once whether a current
+has left its band. On a bench they ask at no clock (`hf.simulate(located=True)` finds when); `ema discrepancy` takes
+the step that fits the record, from 0.25 µs (no clock, or one as fast) to 20 µs. Recorded currents go through two
+first-order stages of `sensors.f_lag` each, get noise of `sensors.current_noise` and are rounded to the converter's
+step (`adc_range`, `adc_bits`); the comparators see them as they are. A cycle begins at rest."""
 
 PARTS: tuple[tuple[str, str, tuple[Callable[..., Any], ...]], ...] = (
     (

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ema.core.names import FAULT_MEANING, FAULTS
 from ema.core.version import version
 from ema.effects import registry
 
@@ -104,6 +105,19 @@ class Gain:
     def no_cause(self) -> str:
         """What explains a record without any effect: faults, of an actuator."""
         return "none of the library" if self.k_names else "faults alone"
+
+    @property
+    def told_faults(self) -> str:
+        """The actuator's faults with their intervals, and how large any other may be; empty of another plant."""
+        if self.k_names or not self.k_interval:
+            return ""
+        named = list(zip(FAULTS, self.k_after, self.k_interval, strict=True))
+        there = [
+            f"{k} ({FAULT_MEANING[k]}) {x:.3g} ({low:.3g} … {high:.3g})" for k, x, (low, high) in named if low > 0.0
+        ]
+        most = max((high for _, _, (low, high) in named if low <= 0.0), default=None)
+        others = [f"{'no other' if there else 'none'} above {most:.2g}"] if most is not None else []
+        return f"Faults: {'; '.join([', '.join(there)] * bool(there) + others)}."
 
     @property
     def rest(self) -> float:

@@ -1,4 +1,4 @@
-"""Current-sensor gain errors: each phase's sensor reads too much or too little."""
+"""Current-sensor gain errors: what controller and recorder read of each phase is too much or too little."""
 
 from __future__ import annotations
 

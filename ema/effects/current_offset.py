@@ -1,4 +1,4 @@
-"""Current-sensor offsets: each phase's sensor reads a constant too much."""
+"""Current-sensor offsets: what controller and recorder read of each phase is a constant too much."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Gear compliance: the gear train is a spring between the motor and an inertia at the user."""
+"""Gear compliance: the gear train is a spring between the motor and an inertia at the user.
+
+On an actuator that inertia is added to J_m, and the spring begins where the play ends; on an axis it is a part of J.
+"""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from .search import AxisSizes, Look, Span
 
 
 def factor(theta_m, w_m, theta_u, direction, tau_load, per_torque):
-    """F × (1 + c |τ_load|)"""
+    """F × (1 + c |τ_m|), with τ_m the torque of the motor"""
     return 1.0 + per_torque * abs(tau_load)
 
 

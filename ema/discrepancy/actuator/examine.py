@@ -189,7 +189,8 @@ def _describe_conditions(ema: EmaPlant) -> list[str]:
     if ema.data.zero:
         notes.append(f"θ_m/GR and θ_u are {ema.data.zero:.2g} rad apart in the middle of the play")
     if ema.step:
-        notes.append(f"the comparators of the record switch as if evaluated every {1e6 * ema.step:g} µs")
+        finest = ", the finest that was tried: or at no clock" if ema.step < 1.1 * min(TRIED) else ""
+        notes.append(f"the comparators of the record switch as if evaluated every {1e6 * ema.step:g} µs{finest}")
     return notes
 
 
