@@ -30,6 +30,7 @@ from .finding.paths import (
 )
 from .finding.simpler import drop_constant_parts, drop_faults, simplify, take_resolver_zero
 from .finding.verdicts import NEARLY, settle_at_minimum
+from .fitting.comparators import TRIED
 from .fitting.growing import describe, deviations, find_faults_beside, find_growing_faults
 from .fitting.model import Model
 from .fitting.search import Search
