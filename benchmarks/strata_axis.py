@@ -23,11 +23,11 @@ from ema.core.records import Array, Cycle, Record
 EFFECTS = list(hidden_axis.LIBRARY)
 # Of other simulators, what the library has got a law for since.
 LEARNT = {"one_sided_driver": "drive_unequal", "current_ripple": "flux_ripple", "crank": "inertia_by_angle",
-          "friction_twice": "friction_by_angle"}  # fmt: skip
+          "friction_twice": "friction_by_angle", "gap": "gear_play"}  # fmt: skip
 OUTSIDE = [kind for kind in (*hidden_axis.OUTSIDE, *strange.KINDS) if kind not in ("nothing", "current_lag", *LEARNT)]
 # Effects of the library that act like what is outside it, so that naming them is the right place.
 NEAR = {
-    "cushion": ("spring_load",), "gap": ("gear_compliance",), "maxwell_slip": ("friction_memory",),
+    "cushion": ("spring_load",), "maxwell_slip": ("friction_memory",),
     "heat": ("friction_drift",), "clutch": ("gear_compliance",),
     "one_way_fan": ("quadratic_drag", "viscous_by_direction"), "load_step": ("constant_load",),
     "centrifugal": ("quadratic_drag", "viscous_drag"),

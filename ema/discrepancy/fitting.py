@@ -321,7 +321,7 @@ def fit(
         J = of.slopes(x, rows, moved)
     residuals, more = run
     scale = scale_of(residuals)
-    covariance = of.covariance(J, rows, residuals, scale)
+    covariance = of.covariance(J, rows, residuals, scale) + np.diag([f.rough**2 for f in of.free])
     return Fit(of.free, of.at(x), residuals, covariance, of.blocks, scale, of.by_noise(J), more)
 
 

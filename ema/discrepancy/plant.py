@@ -17,7 +17,8 @@ class Free:
 
     `scale` is a change that matters (it conditions the search); `step` the change for a finite difference, above the
     simulation's own roughness; `prior` the standard deviation about `start` that is known beforehand, if any. A
-    `is_shape` goes from one law to another: its ends are these laws, not the ends of what is credible.
+    `is_shape` goes from one law to another: its ends are these laws, not the ends of what is credible. `rough` is the
+    standard deviation that is left unknown of it where the misfit has many minima beside each other, as impacts make.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Free:
     step: float = 0.0
     prior: float | None = None
     is_shape: bool = False
+    rough: float = 0.0
 
     @property
     def difference(self) -> float:

@@ -18,6 +18,7 @@ from .axis_layout import N_ROWS, row
 from .lag import follow, precede
 
 Array = NDArray[np.float64]
+GIVES = ("gear_compliance.compliance", "drive_compliance.compliance", "gear_play.gap")
 MODES = {
     "current": kernel.CURRENT,
     "voltage": kernel.VOLTAGE,
@@ -167,8 +168,13 @@ def holding(numbers: Model, theta: Array, direction: Array, t: Array, load: Arra
 
 
 def is_flexible(numbers: Model) -> bool:
-    """Whether the gear gives, so that a window also begins with a twist."""
-    return bool(max(numbers.z[row(f"{name}.compliance")] for name in ("gear_compliance", "drive_compliance")) > 0.0)
+    """Whether the gear gives or has play, so that a window also begins with a twist."""
+    return bool(max(numbers.z[row(name)] for name in GIVES) > 0.0)
+
+
+def has_play(numbers: Model) -> bool:
+    """Whether the gear has play."""
+    return bool(numbers.z[row("gear_play.gap")] > 0.0)
 
 
 def beyond_after(

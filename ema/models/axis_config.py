@@ -137,7 +137,7 @@ class Axis(Settings):
             raise ValueError("drive: speed-loop needs loop: {K_w: …}")
         if "supply_sag" in self.effects and self.V_dc is None:
             raise ValueError("effect 'supply_sag' needs V_dc, the supply without load")
-        for name in ("gear_compliance", "drive_compliance"):
+        for name in ("gear_compliance", "drive_compliance", "gear_play"):
             beyond = self.effects.get(name, {}).get("inertia")
             if beyond is not None and not 0.0 < beyond < self.inertia:
                 raise ValueError(f"{name}: the inertia beyond the gear, {beyond:g}, must be part of {self.inertia:g}")

@@ -25,6 +25,7 @@ from numba import njit
 from ema.effects import (
     cogging,
     friction_memory,
+    gear_play,
     inverter_drop,
     output_load_friction,
     registry,
@@ -72,6 +73,9 @@ _beyond = ("compliance", "inertia", "damping", "drag", "friction")  # of what is
 AT_USER, AT_MOTOR = row("gear_compliance.compliance"), row("drive_compliance.compliance")
 assert [row(f"gear_compliance.{x}") - AT_USER for x in _beyond] == [0, 1, 2, 3, 4]
 assert [row(f"drive_compliance.{x}") - AT_MOTOR for x in _beyond] == [0, 1, 2, 3, 4]
+PLAY = row("gear_play.gap")
+_play = ("gap", "inertia", "friction", "damping", "compliance", "driven")
+assert [row(f"gear_play.{x}") - PLAY for x in _play] == [0, 1, 2, 3, 4, 5]
 LOAD_SHARE, OF_INERTIA = row("output_load_friction.share"), row("output_load_friction.of_inertia")
 LOAD_SQUARE = row("quadratic_output_load_friction.per_torque")
 DEFLECTION, BRISTLE_DAMPING = row("friction_memory.deflection"), row("friction_memory.damping")
@@ -173,19 +177,28 @@ def lost(z, i):
 
 @_inline
 def gear(z, inertia, h):
-    """Stiffness, damping, inertia, drag and friction beyond a gear that gives, and whether the drive acts there.
+    """Stiffness, damping, inertia, drag and friction beyond a gear that gives, whether the drive acts there, and play.
 
     Zeros where it is stiff at steps of `h`. J_a is what is measured, J_b what is beyond:
 
     d = 2 ζ √(J_a J_b / (J_a + J_b) / c)
     """
+    if z[PLAY] > 0.0:
+        J_b = z[PLAY + 1]
+        J_a = inertia - J_b
+        if J_a < LEAST * inertia:
+            return 0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0
+        k = 1.0 / max(z[PLAY + 4], gear_play.CONTACT * h * h * inertia / (J_a * J_b))
+        d = 2.0 * z[PLAY + 3] * math.sqrt(J_a * J_b / inertia * k)
+        return k, d, J_b, 0.0, z[PLAY + 2], z[PLAY + 5] > 0.0, z[PLAY]
     is_driven = z[AT_MOTOR] > 0.0
     first = AT_MOTOR if is_driven else AT_USER
     c, J_b = z[first], z[first + 1]
     J_a = inertia - J_b
     if c <= 0.0 or J_a < LEAST * inertia or h * h * inertia > c * J_a * J_b:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, False
-    return 1.0 / c, 2.0 * z[first + 2] * math.sqrt(J_a * J_b / inertia / c), J_b, z[first + 3], z[first + 4], is_driven
+        return 0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0
+    d = 2.0 * z[first + 2] * math.sqrt(J_a * J_b / inertia / c)
+    return 1.0 / c, d, J_b, z[first + 3], z[first + 4], is_driven, 0.0
 
 
 @njit(inline="always")
@@ -203,14 +216,14 @@ def beyond_after(z, mode, between, t, theta, drive, load, h_max, theta_b, w_b):
         span = (t[k + 1] - t[k]) * (1.0 + z[SKEW])
         n_steps = max(1, math.ceil(span / h_max - 1e-9))
         h = span / n_steps
-        stiffness, damping, J_b, drag, rubbing, is_driven = gear(z, inertia, h)
+        stiffness, damping, J_b, drag, rubbing, is_driven, gap = gear(z, inertia, h)
         w = (theta[k + 1] - theta[k]) / span
         if stiffness == 0.0:
             theta_b, w_b = theta[k + 1], w
             continue
         for s in range(n_steps):
             x = (s + 0.5) / n_steps
-            T = stiffness * (theta[k] + x * span * w - theta_b - 0.5 * h * w_b) + damping * (w - w_b)
+            T = gear_play.through(theta[k] + x * span * w - theta_b - 0.5 * h * w_b, w - w_b, stiffness, damping, gap)
             if is_driven:
                 u = (drive[k] + share_then(between, x) * (drive[k + 1] - drive[k]) - z[OFFSET]) * gain
                 if mode == VOLTAGE:
@@ -272,7 +285,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide
     theta_b, w_b = theta - start[2], w - start[3]
     bristle, deflection = start[4], z[DEFLECTION]
     inertia = z[J] * (1.0 + z[INERTIA])
-    stiffness, damping, J_b, drag, rubbing, is_driven = gear(z, inertia, h_max)
+    stiffness, damping, J_b, drag, rubbing, is_driven, gap = gear(z, inertia, h_max)
     J_a = J_now = inertia - J_b
     uneven = is_uneven(z)
     gain = 1.0 / (1.0 + z[GAIN])
@@ -326,7 +339,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide
                 J_now = max(J_a + inertia * inertia_share(z, 0, 1, theta_mid), LEAST * inertia)
                 tau -= 0.5 * inertia * inertia_slope(z, 0, 1, theta_mid) * w_mid * w_mid
             if stiffness > 0.0:
-                T = stiffness * (theta_mid - theta_b - 0.5 * h * w_b) + damping * (w - w_b)
+                T = gear_play.through(theta_mid - theta_b - 0.5 * h * w_b, w - w_b, stiffness, damping, gap)
                 tau += -T if is_driven else z[LOAD] - T  # the load is beyond the gear too
                 pull = T + (tau_m if is_driven else -z[LOAD]) - drag * w_b
                 theta_b += 0.5 * h * w_b

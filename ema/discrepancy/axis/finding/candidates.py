@@ -17,6 +17,7 @@ from ema.effects import registry
 from ema.effects.search import AxisSizes
 
 from .gear import gear_candidate
+from .play import play_candidate
 
 if TYPE_CHECKING:
     from ema.discrepancy.axis.reading.measured import Measured
@@ -53,6 +54,7 @@ def library(plant: Measured, point: Point, blocks: Sequence[int]) -> list[Candid
         *_clocks_of_the_drive(plant, s, point),
         cogging_candidate(plant, point, blocks),
         gear_candidate(plant, point, blocks),
+        play_candidate(plant, point, blocks),
         stretch_candidate(plant, s, point, blocks),
         fading_candidate(plant, s, point, blocks),
         rubbing_candidate(plant, s, point, blocks),

@@ -26,10 +26,7 @@ FREQUENCIES = 24
 DAMPING, CREEPING = 0.1, 5.0
 RANGES = {DAMPING: (3.0, 0.2), CREEPING: (0.05, 0.01)}
 ROOM = 10.0  # times the damping ratio of the start, up to which a fit may go
-RUBS = {
-    "motor": (0.0, 0.5),
-    "load": (1.0, 0.5),
-}  # share of the dry friction there
+RUBS = {"motor": (0.0, 0.5), "load": (1.0, 0.5)}  # share of the dry friction there
 
 
 def gear_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Candidate | None:

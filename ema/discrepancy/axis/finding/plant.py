@@ -42,6 +42,7 @@ from .screened import begin_with_what_shows, suggest_by_balance
 NOISE = 3.0  # deviations of the position's noise that are no way
 RUNAWAY = 1e6  # a window that runs away counts as no worse than this
 SETTLED = 7.0  # time constants of a winding, by which 0.1 % is left of a current's beginning
+N_AT_IMPACT = 5  # steps at least in a sample, where teeth may meet for one only
 H_MAX = 2.5e-4  # [s] longest step of the simulation, unless the record's own period is longer than ten of them
 
 
@@ -78,6 +79,7 @@ class AxisPlant:
         self.zeros: dict[str, Zero] = zeros(self)
         self.zeros = refine_zeros(self, courses(self), plain_of(plant))
         self._balances: dict[str, Balance | None] = {}
+        self.plays: dict[tuple[object, ...], Array | None] = {}  # what `play_candidate` has found
 
     @property
     def balance(self) -> Balance | None:
@@ -281,7 +283,7 @@ class AxisPlant:
         zero = zeros.get(pack.bench.name, 0.0)
         if pack.direction is not None:
             return axis.holding(model, pack.position + zero, pack.direction, pack.t, pack.load)[None, :]
-        step = self._step(pack)
+        step = _step(pack, model)
         led_in = pack.led_in(max(_late(model)) + (self._settling if pack.bench.roles.kind == "voltage" else 0.0))
         starts = self._starts(pack, model, step, led_in.n)
         starts[:, 0] += zero
@@ -345,10 +347,6 @@ class AxisPlant:
             ]
         return self._packs[blocks]
 
-    def _step(self, pack: Pack) -> float:
-        period = pack.windows[0].period
-        return max(period / 10.0, min(period, H_MAX))
-
     def _starts(self, pack: Pack, model: axis.Model, step: float, n: int) -> Array:
         """True states `n` samples before the windows: the smoothed measurement, undone for what the model's sensors do.
 
@@ -386,6 +384,12 @@ class AxisPlant:
         """Row of the output that is shown and whose error is reported."""
         who = self._bench_of[block].roles
         return who.outputs.index(who.speed) if who.speed in who.outputs and not self.windows[block].static else 0
+
+
+def _step(pack: Pack, model: axis.Model) -> float:
+    """Longest step of a simulation. [s]"""
+    period = pack.windows[0].period
+    return max(period / 10.0, min(period / N_AT_IMPACT if axis.has_play(model) else period, H_MAX))
 
 
 def _late(model: axis.Model) -> tuple[float, float]:

@@ -44,6 +44,7 @@ class Measured(Protocol):
     benches: tuple[Bench, ...]
     windows: tuple[Window, ...]
     zeros: dict[str, Zero]
+    plays: dict[tuple[object, ...], Array | None]
 
     @property
     def base(self) -> Sequence[Free]:
