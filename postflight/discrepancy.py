@@ -79,7 +79,7 @@ def discrepancy(
         click.echo(f"Verdict: {findings.verdict}.")
         for sentence in findings.sentences(numbers=True):
             click.echo(sentence)
-        if findings.gain.told_faults:
+        if findings.gain.told_faults and findings.verdict != "unexplained":  # a model that is refuted tells none
             click.echo(findings.gain.told_faults)
         for line in list_leading(findings):
             click.echo(line)
