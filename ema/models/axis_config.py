@@ -30,6 +30,9 @@ def _noise(value: Any, info: ValidationInfo) -> Any:
     return {name: to_unit(x, CHANNELS[name].unit) if isinstance(x, str) else x for name, x in value.items()}
 
 
+BEYOND_GEAR = ("gear_compliance", "drive_compliance", "gear_play")  # effects that take a part of the inertia there
+
+
 class SpeedLoop(Settings):
     """Proportional speed control:  i_q = sat(K_w (ω_ref - ω_m), ±I_max)."""
 
@@ -137,7 +140,7 @@ class Axis(Settings):
             raise ValueError("drive: speed-loop needs loop: {K_w: …}")
         if "supply_sag" in self.effects and self.V_dc is None:
             raise ValueError("effect 'supply_sag' needs V_dc, the supply without load")
-        for name in ("gear_compliance", "drive_compliance", "gear_play"):
+        for name in BEYOND_GEAR:
             beyond = self.effects.get(name, {}).get("inertia")
             if beyond is not None and not 0.0 < beyond < self.inertia:
                 raise ValueError(f"{name}: the inertia beyond the gear, {beyond:g}, must be part of {self.inertia:g}")

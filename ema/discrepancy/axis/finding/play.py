@@ -12,8 +12,7 @@ from ema.core.records import Array
 from ema.discrepancy.fitting import log_likelihood, scale_of
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects.gear_play import EFFECT
-
-from .gear import NAMES as GIVES
+from ema.models.axis_config import BEYOND_GEAR
 
 if TYPE_CHECKING:
     from ema.discrepancy.axis.reading.measured import Measured
@@ -36,7 +35,7 @@ ROUGH = 0.02  # share of a parameter by which populations of other seeds end apa
 
 def play_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Candidate | None:
     """The likeliest play as a start, or None where none fits better than no play."""
-    taken = any(key.startswith((NAME, *GIVES.values())) for key in point)
+    taken = any(key.startswith(BEYOND_GEAR) for key in point)
     moving = [j for j in blocks if not plant.windows[j].static]
     if taken or not moving or plant.plant.drive == "speed-loop":
         return None
