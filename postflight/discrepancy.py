@@ -44,7 +44,8 @@ def discrepancy(
 
     Writes findings.json, report.html (opens offline) and extended.yaml: the plant with the effects that were found,
     which every other command accepts. Interrupted (Ctrl-C) it writes the first two with what leads by then, marked as
-    unfinished.
+    unfinished. A record that agrees takes half a minute of one core; where causes are weighed against each other, it is
+    one to ten.
 
     \b
     Examples:
