@@ -88,6 +88,12 @@ class AxisPlant:
             self._balances[self.between] = balance(self)
         return self._balances[self.between]
 
+    @property
+    def left_by_balance(self) -> float:
+        """Mean square that the balance of torque leaves, over what noise makes of it; infinite where there is none."""
+        of = self.balance
+        return of.left / of.noise if of is not None and of.noise > 0.0 else np.inf
+
     def _take(self, benches: Sequence[Bench], filters: list[Filter | None] | None = None) -> None:
         self.benches = tuple(benches)
         self.windows: tuple[Window, ...] = tuple(w for b in benches for w in b.windows)

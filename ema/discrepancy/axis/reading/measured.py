@@ -47,6 +47,11 @@ class Measured(Protocol):
     plays: dict[tuple[object, ...], Array | None]
 
     @property
+    def left_by_balance(self) -> float:
+        """Mean square that the balance of torque leaves, over what noise makes of it; infinite where there is none."""
+        ...
+
+    @property
     def base(self) -> Sequence[Free]:
         """Parameters free in every model."""
         ...
