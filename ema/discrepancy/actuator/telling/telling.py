@@ -21,6 +21,7 @@ from ema.discrepancy.actuator.simulating.noise import SEED as NOISE_SEED
 from ema.discrepancy.actuator.simulating.noise import Verdict
 from ema.discrepancy.engine.contest import Outcome
 from ema.discrepancy.findings import WITHIN, Findings, FoundEffect, Gain, Quantity, reject
+from ema.discrepancy.grade import UNSOLVED
 from ema.discrepancy.plant import Point
 from ema.effects import registry
 
@@ -82,7 +83,7 @@ def write_findings(
         notes.append("no winding temperature (temp_w) was recorded: effects of temperature are seen as constant")
     rest = 0.0 if v.is_noise else float(np.sqrt(max(left, _left_in_training(before, after))))
     found = [_describe_effect(after, c.effect, a, rest, outcome, least_sd) for c, a in kept]
-    if odd or not v.is_noise:
+    if odd or not v.is_noise or made.verdict in UNSOLVED:
         found = [replace(e, confidence=UNCERTAIN_LAW * e.confidence) for e in found]
     if is_beside:
         notes += _recorded_once(search, after)
