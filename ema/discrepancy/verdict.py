@@ -10,7 +10,8 @@ from scipy import stats
 
 from ema.core.records import Array
 
-FALSE_ALARMS = 0.005  # of all tests together
+BY_CHANCE = 2.5e-4  # probability of an alarm by all tests together: of 400 records none, nine times in ten
+BY_NOISE = 0.005  # that noise, where it was estimated, is as much larger than that: no sample more would help
 GROUPS = (1, 8, 64)  # samples averaged before a chi-square: the time scales looked at
 N_LAGS = 8
 MIN_PAIRS = 30  # of residuals, for their correlation to be one of many products
@@ -21,16 +22,20 @@ CLIP = 5.0  # a single wild sample is not a cause
 
 @dataclass(frozen=True)
 class Verdict:
-    """Answer of the tests: the smallest p-value after correction for their number, and which test gave it."""
+    """Answer of the tests: the p-value, after correction for their number, of the one that is nearest to an alarm.
+
+    `level` is the p-value at which that one raises it, `because` what it says.
+    """
 
     p_value: float
     because: str
     rms: float
+    level: float
 
     @property
     def is_noise(self) -> bool:
         """True where the residual is compatible with noise."""
-        return self.p_value >= FALSE_ALARMS
+        return self.p_value >= self.level
 
 
 def average(block: Array, group: int) -> Array:
@@ -85,14 +90,18 @@ def judge(residuals: Sequence[Array], *, noise_uncertainty: float | Sequence[flo
         Relative, of the noise's amplitude, alike or for averages over `GROUPS` of samples.
     """
     of = dict(zip(GROUPS, np.broadcast_to(noise_uncertainty, len(GROUPS)).tolist(), strict=True))
-    p = {
-        f"residual larger than noise at {g} samples": scale_test(residuals, g, unsure, n_free)
+    tests = {
+        f"residual larger than noise at {g} samples": (
+            scale_test(residuals, g, unsure, n_free),
+            BY_NOISE if unsure > 0.0 else BY_CHANCE,
+        )
         for g, unsure in of.items()
         if g == GROUPS[0] or unsure < MOSTLY
     }
     if of[GROUPS[0]] < MOSTLY:
-        p["neighbouring residuals are correlated"] = correlation_test(residuals)
-    corrected = {name: min(1.0, value * len(p)) for name, value in p.items()}
-    because = min(corrected, key=lambda name: corrected[name])
+        tests["neighbouring residuals are correlated"] = (correlation_test(residuals), BY_CHANCE)
+    corrected = {name: min(1.0, p * len(tests)) for name, (p, _) in tests.items()}
+    level = {name: at for name, (_, at) in tests.items()}
+    because = min(tests, key=lambda name: corrected[name] / level[name])
     flat = np.concatenate([np.clip(block, -CLIP, CLIP).ravel() for block in residuals])
-    return Verdict(corrected[because], because, float(np.sqrt(np.mean(flat**2))))
+    return Verdict(corrected[because], because, float(np.sqrt(np.mean(flat**2))), level[because])
