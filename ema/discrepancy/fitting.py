@@ -97,12 +97,14 @@ def log_likelihood(residuals: Sequence[Array], scale: float) -> list[Array]:
     return out
 
 
-def rate(runs: Sequence[Sequence[Array]], more: Sequence[Sequence[Array]] = ()) -> list[float]:
-    """Log-likelihood of several residuals of the same blocks, all at the smallest of their scales.
+def rate(
+    runs: Sequence[Sequence[Array]], more: Sequence[Sequence[Array]] = (), scale: float | None = None
+) -> list[float]:
+    """Log-likelihood of several residuals of the same blocks, all at one scale: the smallest of theirs if not given.
 
     `more` is what a further draw of the drive's noise adds to each (`add_by_noise`).
     """
-    scale = min(scale_of(r) for r in runs)
+    scale = min(scale_of(r) for r in runs) if scale is None else scale
     rates = [float(sum(s.sum() for s in log_likelihood(r, scale))) for r in runs]
     back = [float(sum(s.sum() for s in given_back(d, scale))) for d in more]
     return [own + its for own, its in zip(rates, back, strict=True)] if back else rates

@@ -18,7 +18,6 @@ from .axis_layout import N_ROWS, row
 from .lag import follow, precede
 
 Array = NDArray[np.float64]
-GIVES = ("gear_compliance.compliance", "drive_compliance.compliance", "gear_play.gap")
 MODES = {
     "current": kernel.CURRENT,
     "voltage": kernel.VOLTAGE,
@@ -169,7 +168,8 @@ def holding(numbers: Model, theta: Array, direction: Array, t: Array, load: Arra
 
 def is_flexible(numbers: Model) -> bool:
     """Whether the gear gives or has play, so that a window also begins with a twist."""
-    return bool(max(numbers.z[row(name)] for name in GIVES) > 0.0)
+    springs = (numbers.z[row(f"{name}.compliance")] for name in ("gear_compliance", "drive_compliance"))
+    return has_play(numbers) or bool(max(springs) > 0.0)
 
 
 def has_play(numbers: Model) -> bool:

@@ -183,22 +183,20 @@ def gear(z, inertia, h):
 
     d = 2 ζ √(J_a J_b / (J_a + J_b) / c)
     """
-    if z[PLAY] > 0.0:
-        J_b = z[PLAY + 1]
-        J_a = inertia - J_b
-        if J_a < LEAST * inertia:
-            return 0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0
-        k = 1.0 / max(z[PLAY + 4], gear_play.CONTACT * h * h * inertia / (J_a * J_b))
-        d = 2.0 * z[PLAY + 3] * math.sqrt(J_a * J_b / inertia * k)
-        return k, d, J_b, 0.0, z[PLAY + 2], z[PLAY + 5] > 0.0, z[PLAY]
-    is_driven = z[AT_MOTOR] > 0.0
-    first = AT_MOTOR if is_driven else AT_USER
-    c, J_b = z[first], z[first + 1]
+    gap, is_driven = z[PLAY], z[AT_MOTOR] > 0.0
+    if gap > 0.0:
+        is_driven = z[PLAY + 5] > 0.0
+        J_b, rubbing, zeta, c, drag = z[PLAY + 1], z[PLAY + 2], z[PLAY + 3], z[PLAY + 4], 0.0
+    else:
+        first = AT_MOTOR if is_driven else AT_USER
+        c, J_b, zeta, drag, rubbing = z[first], z[first + 1], z[first + 2], z[first + 3], z[first + 4]
     J_a = inertia - J_b
-    if c <= 0.0 or J_a < LEAST * inertia or h * h * inertia > c * J_a * J_b:
+    is_rigid = c <= 0.0 or h * h * inertia > c * J_a * J_b
+    if J_a < LEAST * inertia or (is_rigid and gap == 0.0):
         return 0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0
-    d = 2.0 * z[first + 2] * math.sqrt(J_a * J_b / inertia / c)
-    return 1.0 / c, d, J_b, z[first + 3], z[first + 4], is_driven, 0.0
+    if gap > 0.0:
+        c = max(c, gear_play.CONTACT * h * h * inertia / (J_a * J_b))
+    return 1.0 / c, 2.0 * zeta * math.sqrt(J_a * J_b / inertia / c), J_b, drag, rubbing, is_driven, gap
 
 
 @njit(inline="always")

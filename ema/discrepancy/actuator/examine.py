@@ -30,7 +30,7 @@ from .finding.paths import (
 )
 from .finding.simpler import drop_constant_parts, drop_faults, simplify, take_resolver_zero
 from .finding.verdicts import NEARLY, settle_at_minimum
-from .fitting.comparators import TRIED
+from .fitting.comparators import is_finest
 from .fitting.growing import describe, deviations, find_faults_beside, find_growing_faults
 from .fitting.model import Model
 from .fitting.search import Search
@@ -190,7 +190,7 @@ def _describe_conditions(ema: EmaPlant) -> list[str]:
     if ema.data.zero:
         notes.append(f"θ_m/GR and θ_u are {ema.data.zero:.2g} rad apart in the middle of the play")
     if ema.step:
-        finest = ", the finest that was tried: or at no clock" if ema.step < 1.1 * min(TRIED) else ""
+        finest = ", the finest that was tried: or at no clock" if is_finest(ema, ema.step) else ""
         notes.append(f"the comparators of the record switch as if evaluated every {1e6 * ema.step:g} µs{finest}")
     return notes
 

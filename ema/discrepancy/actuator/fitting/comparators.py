@@ -60,6 +60,11 @@ def is_coarse(step: float) -> bool:
     return step > max(STEPS)
 
 
+def is_finest(plant: EmaPlant, step: float) -> bool:
+    """Whether none finer was tried: the record's comparators may act at no clock at all."""
+    return step == dividing(plant.plant, min(TRIED))
+
+
 def find_delay(plant: EmaPlant, noise: Noise, point: Point, cycles: Sequence[int], step: float) -> Point:
     """`point` with the delay that is likeliest by the usual steps, of those that a coarser step can stand for."""
     name = f"{LATE}.time"

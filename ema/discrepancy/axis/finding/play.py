@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, differential_evolution
 
 from ema.core.records import Array
-from ema.discrepancy.fitting import log_likelihood, scale_of
+from ema.discrepancy.fitting import rate, scale_of
 from ema.discrepancy.plant import Candidate, Free, Point
 from ema.effects.gear_play import EFFECT
 from ema.models.axis_config import BEYOND_GEAR
@@ -47,25 +47,23 @@ def play_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Cand
         return None
     beside = frozenset(key.partition(".")[0] for key in point)
     key = (tuple(blocks), plant.between, beside)
-    start = _started(plant, point, _some(plant, moving))
+    looked_at = _some(plant, moving)
+    start = _started(plant, point, looked_at)
     if key not in plant.plays:
         before = next((x for x in plant.plays.values() if x is not None), None)
-        plant.plays[key] = _search(plant, point, start, _some(plant, moving), before)
+        plant.plays[key] = _search(plant, point, start, looked_at, before)
     x = plant.plays[key]
     if x is None:
         return None
     best = start(x)
+    F = best.get("F_d", plant.plant.F_d) + best[f"{NAME}.friction"]
     bounds = {
         "gap": 10.0 * best[f"{NAME}.gap"],
         "inertia": 0.97 * best.get("J", plant.plant.inertia),
         "damping": 1.0,
+        "compliance": 10.0 * best[f"{NAME}.compliance"],
+        **({"friction": 2.0 * F} if best[f"{NAME}.friction"] > 0.0 else {}),
     }
-    bounds |= {"compliance": 10.0 * best[f"{NAME}.compliance"]}
-    bounds |= (
-        {"friction": 2.0 * (best.get("F_d", plant.plant.F_d) + best[f"{NAME}.friction"])}
-        if best[f"{NAME}.friction"] > 0.0
-        else {}
-    )
     return Candidate(NAME, NAME, tuple(_free(name, best, high) for name, high in bounds.items()), (best,))
 
 
@@ -102,11 +100,10 @@ def _search(
     without = plant.residuals([point], windows)[0]
     scale = scale_of(without)
 
-    def likelihood(runs: Sequence[Sequence[Array]]) -> Array:
-        return np.array([sum(float(s.sum()) for s in log_likelihood(run, scale)) for run in runs])
-
     def lost(members: Array) -> Array:
-        return likelihood([without]) - likelihood(plant.residuals([{**point, **start(x)} for x in members.T], windows))
+        runs = plant.residuals([{**point, **start(x)} for x in members.T], windows)
+        here, *there = rate([without, *runs], scale=scale)
+        return here - np.array(there)
 
     generations = iter(range(GENERATIONS))
 
