@@ -77,7 +77,8 @@ def discrepancy(
     if as_json:
         click.echo(files[0].read_text(encoding="utf-8"), nl=False)
     else:
-        click.echo(f"Verdict: {findings.verdict}.")
+        if findings.verdict != "unfinished":  # its first sentence says so
+            click.echo(f"Verdict: {findings.verdict}.")
         for sentence in findings.sentences(numbers=True):
             click.echo(sentence)
         if findings.gain.told_faults and findings.verdict != "unexplained":  # a model that is refuted tells none
