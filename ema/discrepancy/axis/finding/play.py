@@ -31,10 +31,10 @@ RANGES = (
 POPULATION, GENERATIONS = 8, 100  # members per parameter, and how often they are renewed
 AGAIN = 15  # generations where play was found before, beside other effects
 IN_DOUBT = 20  # generations after which a population that has found nothing better than no play is left
-LOOKED_AT = 2_000  # samples
+LOOKED_AT = 4_000  # samples
 LEFT = 2.0  # times what noise makes, by which a balance is off where play is worth a search
 SEED = 1
-ROUGH = 0.02  # share of a parameter by which populations of other seeds end apart: impacts make many minima
+ROUGH = 0.045  # share of a parameter by which populations end off, of five records (rms): impacts make many minima
 
 
 def play_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Candidate | None:
