@@ -25,6 +25,7 @@ from .rounds import (
     revise,
     select,
     try_library_alone,
+    try_sets,
     try_together,
 )
 from .selection import above_noise, compare, fit_base, is_nameless
@@ -56,6 +57,7 @@ def examine(
     state = try_library_alone(plant, state, progress)
     if together is not None:
         state = try_together(plant, state, together, progress)
+    state = try_sets(plant, state, progress)
     trust, weighed = drop_unlikely(plant, state, progress)
     plain = state.plain
     verdict = judge_model(plant, plain)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from .form import FORM
@@ -17,12 +17,16 @@ from .selection import (
     above_noise,
     choose,
     compare,
+    find_likeliest,
     fit_base,
     fit_model,
     fit_with_each,
+    is_nameless,
     is_worth_it,
     may_be_worth_it,
+    superpose,
 )
+from .superposing import rank_sets
 from .verdict import Verdict, judge
 
 MAX_EFFECTS = 3
@@ -31,6 +35,7 @@ MAX_ADDED = 5  # of both kinds, further lines of a kind that is there already co
 IMMATERIAL = 0.01  # of the noise's mean square: what takes less is told, and no cause: no plant file is that exact
 MANY = 12  # free parameters from which an effect is revised beside its strongest rivals only
 N_RIVALS = 6
+N_SETS = 2  # of each size that should explain most in the place of what was found one by one, which are fitted
 
 
 Reread = Callable[[Tried, Tried], bool]
@@ -50,6 +55,8 @@ def never(model: Tried, further: Tried) -> bool:
 class State:
     """Models without effects and so far, and for each accepted effect the trials in its place and the model without.
 
+    `forward` are the trials beside nothing and beside the first effect, each with the model before; `besides` sets of
+    effects that were fitted in the place of the model.
     `reread` weighs a condition of the records against a further effect; where it says so, the selection begins again.
     `unlikely` are rows of what was considered and is less likely than not (`Findings.rejected`).
     """
@@ -61,6 +68,8 @@ class State:
     n_rounds: int = 0
     library_only: bool = False  # no nameless terms
     reread: Reread = never
+    forward: list[tuple[dict[str, Tried], Tried]] = field(default_factory=list)
+    besides: list[Tried] = field(default_factory=list)
     unlikely: list[dict[str, Any]] = field(default_factory=list)
     immaterial: str = ""  # what ended the selection by taking less than matters
 
@@ -92,6 +101,9 @@ def select(plant: Plant, state: State, progress: Progress) -> None:
     begun_anew_with = -1  # effects
     while not judge_model(plant, state.model).is_noise:
         trials = _round(plant, state, state.model, progress)
+        n = len(state.model.accepted)
+        if n + 2 <= MAX_EFFECTS:
+            state.forward = [*state.forward[:n], (trials, state.model)]
         best = choose(trials, state.model) if trials else None
         if best is None or not may_be_worth_it(trials[best], state.model):
             return
@@ -155,11 +167,54 @@ def try_together(plant: Plant, state: State, together: Together, progress: Progr
     model = fit_model(plant, [found] * N_FOLDS, [[{**own.point, **start}] for own in state.plain.fits])
     if not is_worth_it(model, state.plain):
         return state
-    other = State(state.plain, model, [({}, state.plain)] * len(found), state.tried, state.n_rounds)
+    other = State(
+        state.plain, model, [({}, state.plain)] * len(found), state.tried, state.n_rounds, forward=state.forward
+    )
     revise(plant, other, progress)
     select(plant, other, progress)
     revise(plant, other, progress)
     return other if compare(other.model, state.model).is_significant else state
+
+
+def try_sets(plant: Plant, state: State, progress: Progress) -> State:
+    """Sets of effects that should explain as much together as those found one by one: the likeliest is the model.
+
+    Whether it is or not, the others are weighed beside it.
+    """
+    if not state.model.accepted:
+        return state
+    for trials, before in state.forward:
+        for keys in _instead(plant, state, trials, before):
+            progress(" + ".join((*(c.key for c in before.accepted), *keys)))
+            state.besides.append(superpose(plant, before, [trials[key] for key in keys]))
+    best = find_likeliest((state.model, *state.besides))
+    if best is state.model:
+        return state
+    besides = [t for t in (state.model, *state.besides) if t is not best]
+    rounds: list[tuple[dict[str, Tried], Tried]] = [({}, state.plain)] * len(best.accepted)
+    other = replace(state, model=best, rounds=rounds, besides=besides)
+    revise(plant, other, progress)
+    select(plant, other, progress)
+    revise(plant, other, progress)
+    return other
+
+
+def _instead(plant: Plant, state: State, trials: dict[str, Tried], before: Tried) -> list[tuple[str, ...]]:
+    """What to add to the model `before`, of what was tried there: the best sets of each size that were not fitted.
+
+    None that holds the model, beside which no further effect was worth it.
+    """
+    fitted = [before, *(t for of, _ in state.rounds for t in of.values()), *state.besides]
+    known = [{c.key for c in t.accepted} for t in fitted]
+    model, there = ({c.key for c in t.accepted} for t in (state.model, before))
+    fits = {key: t.fits for key, t in trials.items() if not is_nameless(key, t)}
+    chosen: dict[int, list[tuple[str, ...]]] = {}
+    for _, keys in rank_sets(plant, before.fits, fits, MAX_EFFECTS - len(there)):
+        of_size = chosen.setdefault(len(keys), [])
+        own = there | set(keys)
+        if len(of_size) < N_SETS and not own >= model and own not in known:
+            of_size.append(keys)
+    return [keys for of_size in chosen.values() for keys in of_size]
 
 
 def _strongest(trials: dict[str, Tried], before: Tried) -> set[str]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ema.core.records import Array
 
+from .engine.posterior import PRIOR, log_odds
 from .fitting import Fit, add_by_noise, best_fit, fit, given_back, log_likelihood, rate, scale_of, slopes
 from .plant import Block, Candidate, Plant, Point
 
@@ -136,6 +137,17 @@ def log_scores(tried: Tried, scale: float) -> Array:
     return np.array([float(part.sum()) for block in blocks for part in np.array_split(block, n)])
 
 
+def add_prior(score: float, tried: Tried) -> float:
+    """The evidence for a set of effects: what held-out parts say, and how likely so many are. [nats]"""
+    return score + log_odds(PRIOR) * len(tried.accepted)
+
+
+def find_likeliest(sets: Sequence[Tried]) -> Tried:
+    """The set of effects with the largest evidence."""
+    scale = min(t.scale for t in sets)
+    return max(sets, key=lambda t: add_prior(float(log_scores(t, scale).sum()), t))
+
+
 def list_folds(plant: Plant) -> list[tuple[list[int], list[int]]]:
     """For each fold the blocks to fit on and those left out."""
     everything = range(len(plant.blocks))
@@ -221,6 +233,18 @@ def fit_with_each(
             progress(f"{key}, all parameters")
             out[key] = refit(plant, out[key])
     return out
+
+
+def superpose(plant: Plant, before: Tried, trials: Sequence[Tried]) -> Tried:
+    """The model `before` with what each of several trials added to it."""
+    models, starts = [], []
+    for k, own in enumerate(before.fits):
+        added = [(trial.models[k][-1], trial.fits[k].point) for trial in trials]
+        names = [{*candidate.starts[0], *(f.name for f in candidate.free)} for candidate, _ in added]
+        of = {name: point[name] for (_, point), these in zip(added, names, strict=True) for name in these}
+        models.append([*before.models[k], *(candidate for candidate, _ in added)])
+        starts.append([{**own.point, **of}])
+    return fit_model(plant, models, starts)
 
 
 def _find_leading(trials: dict[str, Tried], model: Tried) -> list[str]:

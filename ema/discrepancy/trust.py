@@ -26,7 +26,8 @@ def drop_unlikely(plant: Plant, state: State, progress: Progress) -> tuple[dict[
     """
     known: dict[str, float] = {}
     while True:
-        trust, weighed = _trust(plant, state), weigh_sets(state.plain, state.model, state.rounds)
+        weighed = weigh_sets(state.plain, state.model, state.rounds, state.besides)
+        trust = _trust(plant, state)
         explained = is_explained(plant, state.plain, state.model)
         odds = {}
         for k, c in enumerate(state.model.accepted):

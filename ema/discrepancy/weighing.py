@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .engine.posterior import PRIOR, Entry, log_odds, p_cause, posterior, thin
+from .engine.posterior import Entry, p_cause, posterior, thin
 from .fitting import Fit
 from .grade import IN_SET
 from .plant import Point
-from .selection import NEARLY_NOISE, SAME_SHARE, Tried, is_nameless, log_scores
+from .selection import NEARLY_NOISE, SAME_SHARE, Tried, add_prior, is_nameless, log_scores
 
 TOLD = 1e-3  # probability from which a set is told
 
@@ -77,14 +77,19 @@ class Weighed:
         return thin(self.entries, {**dict.fromkeys(keys, 1.0), **share, **trust})
 
 
-def weigh_sets(plain: Tried, model: Tried, rounds: Sequence[tuple[dict[str, Tried], Tried]]) -> Weighed:
+def weigh_sets(
+    plain: Tried,
+    model: Tried,
+    rounds: Sequence[tuple[dict[str, Tried], Tried]],
+    besides: Sequence[Tried] = (),
+) -> Weighed:
     """Every set of effects of the library that was fitted, beside the terms without a name that the model has.
 
     Where the likeliest leaves more than noise, the form of its laws is another, and so may be that of the others: each
     may be off by a share of what it explains. `rounds` hold, for each effect of `model`, the trials in its place and
-    the model without it.
+    the model without it; `besides` are other sets that were fitted.
     """
-    fitted = [plain]
+    fitted = [plain, *besides]
     for trials, before in rounds:
         fitted += [*trials.values(), before]
     terms = {c.key for c in model.accepted if c.is_structure}
@@ -93,7 +98,7 @@ def weigh_sets(plain: Tried, model: Tried, rounds: Sequence[tuple[dict[str, Trie
     parts = {names: log_scores(t, scale) for names, t in sets.items()}
     score = {names: float(of.sum()) for names, of in parts.items()}
     form = _misfits_of_form(score) if scale > NEARLY_NOISE else {}
-    evidence = {names: z + log_odds(PRIOR) * len(names) for names, z in score.items()}
+    evidence = {names: add_prior(score[names], t) for names, t in sets.items()}
     in_place = {
         own.key: {key: t for key, t in trials.items() if not is_nameless(key, t)}
         for own, (trials, _) in zip(model.accepted, rounds, strict=True)
