@@ -194,7 +194,10 @@ def _moving(plant: Axis, length: float, group: str, cycle: Cycle, who: Roles, no
     if who.position is not None:
         raw = cycle[who.position]
         smoothed = smooth(raw, gaps, width)
-    speed = smooth(cycle[who.speed], gaps, width) if who.speed is not None else smooth(raw, gaps, 2 * width - 1, dt)
+    speed, narrow = (
+        smooth(cycle[who.speed], gaps, n) if who.speed is not None else smooth(raw, gaps, 2 * n - 1, dt)
+        for n in (width, WIDTHS[-1])
+    )
     if who.position is None:
         raw = smoothed = cumulative_trapezoid(speed, t, initial=0.0)
     warmer = cycle["temp_w"] - T_REFERENCE if "temp_w" in cycle else np.zeros(n)
@@ -202,7 +205,8 @@ def _moving(plant: Axis, length: float, group: str, cycle: Cycle, who: Roles, no
     margin = HALF if who.speed is not None else 2 * HALF  # over which the smoothed speed mixes rest with motion
     of_drive = pushed(plant, who.kind)[0] * noise[who.drive].rms(np.gradient(cycle[who.drive], t))
     jolted = of_drive * dt * np.sqrt(2 * margin + 1)  # one deviation of what its noise makes of a speed meanwhile
-    still = np.abs(speed) < np.hypot(AT_REST * START_NOISE * speed_noise(who, noise, dt), jolted)
+    seen = np.hypot(AT_REST * START_NOISE * speed_noise(who, noise, dt), jolted)
+    still = np.abs(speed) < seen + np.abs(speed - narrow)  # an axis that stops for a moment is smoothed to a slow one
     rests = _rests(still | _reversals(speed), margin)
     turns = np.flatnonzero(np.diff(np.sign(speed)) != 0.0) + 1
     anew = np.unique(np.concatenate(([0], cuts, gaps, np.flatnonzero(still) + 1, turns)))  # what was before is no lead
