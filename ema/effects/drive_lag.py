@@ -1,7 +1,7 @@
 """Lag of the drive: a current loop of finite bandwidth, so that the torque follows what is recorded with a delay.
 
 Where the record holds the current (or torque, or voltage) that was asked for, what acts is that through a filter of the
-first order: τ di/dt = i_ref - i.
+first order: τ di/dt = i_ref - i. In a speed loop it is the current that the loop asks for.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .search import AxisSizes, Span
 
 def on_axis(s: AxisSizes) -> Mapping[str, Span] | None:
     """Where a search begins, by what the records hold."""
-    if s.driven_by == "speed-loop" or not s.moves:
+    if not s.moves:
         return None
     return {"time": Span(0.0, 40.0 * s.period, (0.5 * s.period, 5.0 * s.period), 0.3 * s.period)}
 

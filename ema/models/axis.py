@@ -137,11 +137,14 @@ def _known(load: Array | None, t: Array) -> Array:
     return np.zeros(len(t)) if load is None else load
 
 
-def lag_of_drive(numbers: Model) -> float:
-    """Time constant with which what acts follows the recorded drive, by the clock of the record. [s]
+def lag_of_drive(numbers: Model, drive: str) -> float:
+    """Time constant with which what acts follows the recorded `drive`, by the clock of the record. [s]
 
-    Below zero it is that with which the recorded drive follows what acts.
+    Below zero it is that with which the recorded drive follows what acts. A commanded speed acts at once: what lags
+    there is the current within the loop.
     """
+    if drive == "speed-loop":
+        return 0.0
     lag, of_filter = (numbers.z[row(f"{name}.time")] for name in ("drive_lag", "drive_filter"))
     return float((lag - of_filter) / (1.0 + numbers.z[row("clock_skew.rate")]))
 

@@ -66,7 +66,7 @@ J, C, F_S, F_D, K_T, K_E, R, L = (row(name) for name in ("J", "C", "F_s", "F_d",
 K_W, I_MAX, DT, LOAD = row("K_w"), row("I_max"), row("dT"), row("load")
 INERTIA, GAIN, OFFSET = row("inertia.change"), row("drive_gain.gain"), row("drive_offset.offset")
 DROP, BELOW, ROUNDNESS = (row(f"inverter_drop.{name}") for name in ("voltage", "below", "roundness"))
-SKEW = row("clock_skew.rate")
+SKEW, LAG = row("clock_skew.rate"), row("drive_lag.time")
 POSITION_DELAY, SPEED_DELAY = row("position_delay.time"), row("speed_delay.time")
 COGGING = row("cogging.amplitude")
 _beyond = ("compliance", "inertia", "damping", "drag", "friction")  # of what is beyond the gear, seen from the sensor
@@ -300,20 +300,24 @@ def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide
         elif mode == SPEED_LOOP:
             w_meas = delayed(t, out[1], k, z[SPEED_DELAY], slope, skew)
             asked = z[K_W] * (drive[k] - w_meas)
-            i = min(max(asked, -z[I_MAX]), z[I_MAX])
+            if k == 0 or z[LAG] == 0.0:
+                i = i_end = min(max(asked, -z[I_MAX]), z[I_MAX])
         out[2, k] = i
         if k == n - 1:
             break
         span = (t[k + 1] - t[k]) * skew
         n_steps = max(1, math.ceil(span / h_max - 1e-9))
         h = span / n_steps
+        kept = math.exp(-h / z[LAG]) if mode == SPEED_LOOP and z[LAG] > 0.0 else 0.0  # of the lag's error, by a step
         for s in range(n_steps):
             x = (s + 0.5) / n_steps
             t_mid = t[k] + x * (t[k + 1] - t[k])
             z[LOAD] = load[k] + x * (load[k + 1] - load[k])
             if mode == SPEED_LOOP:
                 since = w + 0.5 * dw - out[1, k] if between == FAST else 0.0
-                i = min(max(asked - z[K_W] * since, -z[I_MAX]), z[I_MAX])
+                wanted = min(max(asked - z[K_W] * since, -z[I_MAX]), z[I_MAX])
+                i = wanted + (i_end - wanted) * (1.0 - kept) * z[LAG] / h  # mean over the step
+                i_end = wanted + (i_end - wanted) * kept
             else:
                 u = (drive[k] + share_then(between, x) * (drive[k + 1] - drive[k]) - z[OFFSET]) * gain
                 if mode == VOLTAGE:
@@ -358,7 +362,7 @@ def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide
             theta += 0.5 * h * (w + w_next)
             dw = w_next - w
             w = w_next
-            if mode == VOLTAGE:
+            if mode in (VOLTAGE, SPEED_LOOP):
                 i = i_end
         if k == 0:
             slope = (w - out[1, 0]) / span

@@ -46,6 +46,15 @@ def test_a_heavier_axis_is_named_and_its_interval_holds_the_truth(servo, samples
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("samples", [True, False])
+def test_a_current_that_lags_in_a_speed_loop_is_named(servo, samples):
+    outcome = look(servo, servo.SPEED_LOOP, samples=samples, lag=2e-3)
+    (found,) = outcome.effects
+    assert found["name"] == "drive_lag"
+    assert found["parameters"]["time"]["value"] == pytest.approx(2e-3, rel=0.05)
+
+
+@pytest.mark.slow
 def test_a_motor_that_saturates_is_not_taken_for_a_drive_that_is_held(servo):
     outcome = look(servo, servo.CURRENT, position=True, i_sat=2.5, seconds=4.0)
     assert "saturation" in [e["name"] for e in outcome.effects]

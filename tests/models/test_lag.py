@@ -63,4 +63,23 @@ def test_a_lag_of_the_plant_file_counts():
             "effects": {"drive_lag": {"time": LAG}},
         }
     )
-    assert axis.lag_of_drive(axis.model(plant)) == LAG
+    assert axis.lag_of_drive(axis.model(plant), "current") == LAG
+
+
+def test_in_a_speed_loop_the_current_lags():
+    """J dω/dt = k_t i and τ di/dt = K_w (ω_ref - ω) - i of a loop that acts all the time: a step's second order."""
+    J, k_t, K_w, step, period = 1e-3, 0.1, 0.5, 20.0, 1e-4
+    numbers = {"J": J, "F_d": 0.0, "k_t": k_t, "loop": {"K_w": K_w}, "effects": {"drive_lag": {"time": LAG}}}
+    plant = RotaryAxis.model_validate({"kind": "axis", "drive": "speed-loop", **numbers})
+    t = np.arange(2000) * period
+    ends = np.array([0, len(t)])
+    asked = np.full(len(t), step)
+    # begun where the current is what is asked for: K_w step
+    _, w, i, _ = axis.simulate(
+        axis.model(plant), "speed-loop", ends, t, asked, np.zeros((1, 4)), period, between="fast"
+    )
+    poles = np.roots([LAG, 1.0, k_t * K_w / J])
+    a = np.linalg.solve([[1.0, 1.0], poles], [-step, k_t / J * K_w * step])
+    exact = step + (a @ np.exp(poles[:, None] * t)).real
+    np.testing.assert_allclose(w, exact, atol=2e-3 * step)
+    np.testing.assert_allclose(i, (a * poles @ np.exp(poles[:, None] * t)).real * J / k_t, atol=4e-3 * K_w * step)

@@ -1,7 +1,8 @@
 """A servo whose controller is analogue, or samples; fine steps of Euler's. Shares no code with the models.
 
 The speed loop asks for i = K_w (ω_ref - ω) on a command that is held for each sample of the record. The position loop,
-whose current is recorded as the drive, is always analogue, its command too. Torque may saturate with the current cubed.
+whose current is recorded as the drive, is always analogue, its command too. Torque may saturate with the current cubed,
+and the current follow what is asked for with a lag.
 """
 
 from __future__ import annotations
@@ -18,15 +19,16 @@ CURRENT = {**PLANT, "drive": "current"}
 
 
 @njit(cache=True)
-def _run(command, is_position, samples, J, F, C, i_sat, out):
-    theta, w, i, dt = 0.0, 0.0, 0.0, 1.0 / (RATE * FINE)
+def _run(command, is_position, samples, J, F, C, i_sat, lag, out):
+    theta, w, i, asked, dt = 0.0, 0.0, 0.0, 0.0, 1.0 / (RATE * FINE)
     for k in range(len(command)):
         for s in range(FINE):
             if is_position:
                 after = command[min(k + 1, len(command) - 1)]
-                i = 6.0 * (command[k] + s / FINE * (after - command[k]) - theta) - 0.25 * w
+                asked = 6.0 * (command[k] + s / FINE * (after - command[k]) - theta) - 0.25 * w
             elif s == 0 or not samples:
-                i = 0.4 * (command[k] - w)
+                asked = 0.4 * (command[k] - w)
+            i = asked if lag == 0.0 else i + dt / lag * (asked - i)
             if s == 0:
                 out[0, k], out[1, k], out[2, k] = theta, w, i
             tau = i / (1.0 + abs(i / i_sat) ** 3) ** (1.0 / 3.0) - C * w
@@ -42,7 +44,7 @@ def _run(command, is_position, samples, J, F, C, i_sat, out):
 
 def record(
     seed: int, *, position: bool = False, samples: bool = False, inertia: float = 0.0085, i_sat: float = 1e9,
-    seconds: float = 12.0,
+    lag: float = 0.0, seconds: float = 12.0,
 ) -> Record:  # fmt: skip
     """A record of several sines at once, to a speed loop or (as `i_q`) from a position loop."""
     rng = np.random.default_rng(seed)
@@ -51,7 +53,7 @@ def record(
     phases = rng.uniform(0.0, 6.0, 3)
     command = sum(a * np.sin(2.0 * np.pi * f * t + phi) for a, f, phi in zip(amplitudes, pace, phases, strict=True))
     out = np.zeros((3, len(t)))
-    _run(command, position, samples, inertia, 0.35, 0.004, i_sat, out)
+    _run(command, position, samples, inertia, 0.35, 0.004, i_sat, lag, out)
     theta = out[0] + 4e-4 * rng.standard_normal(len(t))
     w = out[1] + 0.03 * rng.standard_normal(len(t))
     drive = {"i_q": out[2]} if position else {"w_ref": command}

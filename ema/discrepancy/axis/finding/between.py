@@ -10,7 +10,7 @@ lighter by half a sample in the loop's time constant; where the record does not 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from ema.discrepancy.selection import ODDS, Tried, above_noise, compare, fit_bas
 from .plant import AxisPlant
 
 LATE = {"straight": 0.0, "held": 0.5, "held before": -0.5}  # samples by which the motion is later than straight
+LATE_IN_LOOP = {"straight": 0.5, "fast": 0.0}  # the same of a speed loop that acts once a sample, or all the time
 DELAYS = {"position_delay.time": {"theta_m", "q"}, "speed_delay.time": {"w_m", "v"}}  # and the channels they are of
 OF_DRIVE = {"drive_lag.time": 0.0, "clock_skew.late": -np.inf}  # what else makes the motion late, and the least of it
 LEAST = {**dict.fromkeys(DELAYS, 0.0), **OF_DRIVE}
@@ -188,8 +189,9 @@ def _of_balance(plant: AxisPlant) -> str:
     return best if compare(ways[best], ways["straight"]).is_significant else "straight"
 
 
-def _ways(plant: AxisPlant) -> tuple[str, ...]:
-    return ("straight", "fast") if plant.plant.drive == "speed-loop" else tuple(LATE)
+def _ways(plant: AxisPlant) -> Mapping[str, float]:
+    """How the drive may be taken, and by how many samples the motion is late in each."""
+    return LATE_IN_LOOP if plant.plant.drive == "speed-loop" else LATE
 
 
 def _plain(plant: AxisPlant, way: str) -> Tried:
@@ -280,9 +282,9 @@ def _doubt_small_delay(plant: AxisPlant, outcome: Outcome) -> None:
 
 def _widen_by_ways(plant: AxisPlant, outcome: Outcome, name: str, told: list[dict[str, float]]) -> None:
     here, period, fits, tried = plant.between, _period(plant), {}, {}
-    for way in LATE:
+    for way, late in (ways := _ways(plant)).items():
         plant.between = way
-        point = _shorten_delays(outcome.point, (LATE[way] - LATE[here]) * period)
+        point = _shorten_delays(outcome.point, (late - ways[here]) * period)
         fits[way] = _fit_delay(plant, name, point)
         tried[way] = try_at(plant, fits[way].point, fits[way].residuals)
     plant.between = here

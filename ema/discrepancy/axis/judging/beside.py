@@ -66,7 +66,7 @@ class _Extended:
         for name, effect in ((b.roles.position, "position_delay"), (b.roles.speed, "speed_delay")):
             if name and self._late.get(effect):
                 channels[name] = np.interp(t + self._late[effect], t, c[name])
-        lag = axis.lag_of_drive(self._sensors)
+        lag = axis.lag_of_drive(self._sensors, b.roles.kind)
         channels[b.roles.drive] = axis.acting_drive(lag, t, c[b.roles.drive], self.between)
         if b.roles.position:
             channels |= self._straight(b, channels)

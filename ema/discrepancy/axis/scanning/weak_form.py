@@ -166,7 +166,7 @@ def _moving(plant: Measured, model: axis.Model, j: int, offset: int, zero: float
     raw_w = w.speed if speed_row is None else w.outputs[speed_row]
     speed = np.interp(w.t + late[1], w.t, w.speed)
     raw_w = np.interp(w.t + late[1], w.t, raw_w)
-    acting = axis.acting_drive(axis.lag_of_drive(model), w.part.t, w.part.drive, plant.between)
+    acting = axis.acting_drive(axis.lag_of_drive(model, b.roles.kind), w.part.t, w.part.drive, plant.between)
     drive = (w.drive_by(axis.clock_of_drive(model), acting=acting) - z[row("drive_offset.offset")]) / (
         1.0 + z[row("drive_gain.gain")]
     )
@@ -216,7 +216,8 @@ def _current(b: Bench, w: Window, drive: Array, speed: Array, z: Array) -> tuple
     if kind == "voltage":  # quasi-static: the electrical time constant is shorter than a test function
         return (drive - z[row("k_e")] * speed) / max(float(z[row("R")]), 1e-9), k_t
     if kind == "speed-loop":
-        return np.clip(z[row("K_w")] * (drive - speed), -z[row("I_max")], z[row("I_max")]), k_t
+        asked = np.clip(z[row("K_w")] * (drive - speed), -z[row("I_max")], z[row("I_max")])
+        return axis.acting_drive(float(z[row("drive_lag.time")]), w.t, asked), k_t
     return drive, k_t
 
 

@@ -72,7 +72,7 @@ class Pack:
 
     def drive_by(self, model: axis.Model, led_in: LedIn, between: str) -> Array:
         """The drive there, where it has a clock of its own, or is followed with a lag."""
-        clock, lag = axis.clock_of_drive(model), axis.lag_of_drive(model)
+        clock, lag = axis.clock_of_drive(model), axis.lag_of_drive(model, self.bench.roles.kind)
         if lag == 0.0:
             return np.concatenate([w.drive_by(clock, led_in.n) for w in self.windows]) if any(clock) else led_in.drive
         acting = self._after_lag(lag, between)
