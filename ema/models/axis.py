@@ -24,7 +24,10 @@ MODES = {
     "force": kernel.FORCE,
     "speed-loop": kernel.SPEED_LOOP,
 }
-BETWEEN = {"straight": kernel.STRAIGHT, "held": kernel.HELD, "held before": kernel.HELD_BEFORE, "fast": kernel.FAST}
+BETWEEN = {
+    **{"straight": kernel.STRAIGHT, "held": kernel.HELD, "held before": kernel.HELD_BEFORE},
+    **{"fast": kernel.FAST, "analogue": kernel.ANALOGUE},
+}
 Effects = Mapping[str, Mapping[str, float]]
 State = tuple[float, ...]
 
@@ -117,7 +120,7 @@ def simulate(
         ±1 where the axis slides that way throughout the window, 0 where it may rest or turn round.
     between : str
         What the drive does from one sample to the next: runs straight, is held, or is that of the next (held before).
-        A speed loop acts once a sample, or (fast) between samples too.
+        A speed loop acts once a sample, or (fast) between samples too, (analogue) on a command that runs straight.
     bristles : array, shape (n_windows,), optional
         Share of dry friction, -1…1, that is built up where a window begins; all of it where not given.
     load : array, shape (n_times,), optional

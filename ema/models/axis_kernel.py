@@ -39,8 +39,9 @@ from .axis_layout import row
 from .hooks import combined
 
 CURRENT, VOLTAGE, FORCE, SPEED_LOOP = range(4)
-# What a recorded drive does from one sample to the next; FAST: a speed loop acts there too, on a command that is held.
-STRAIGHT, HELD, HELD_BEFORE, FAST = range(4)
+# What a recorded drive does from one sample to the next; there a speed loop acts too on a command that is held (FAST),
+# or runs straight (ANALOGUE).
+STRAIGHT, HELD, HELD_BEFORE, FAST, ANALOGUE = range(5)
 LEAST = 0.02  # of the inertia that is left where it is measured
 CREEP = 1e-9  # [rad/s] at least, where the axis is known to slide
 OUTPUTS = ("theta_m", "w_m", "i_q", "u_q")
@@ -134,7 +135,12 @@ def delayed(t, x, k, delay, slope, skew):
 
     A second is 1 / `skew` seconds of the record's clock.
     """
-    at = t[k] - delay / skew
+    return earlier(t, x, k, t[k] - delay / skew, slope, skew)
+
+
+@_inline
+def earlier(t, x, k, at, slope, skew):
+    """Value of x `at` a time not after t[k], as `delayed`."""
     if at <= t[0]:
         return x[0] + slope * ((at - t[0]) * skew)
     j = k
@@ -143,6 +149,15 @@ def delayed(t, x, k, delay, slope, skew):
     if j >= k:
         return x[k]
     return x[j] + (x[j + 1] - x[j]) * (at - t[j]) / (t[j + 1] - t[j])
+
+
+@_inline
+def delayed_between(t, x, k, now, x_now, delay, slope, skew):
+    """The same a `delay` before a time after t[k], at which the value is `x_now`."""
+    at = now - delay / skew
+    if at <= t[k]:
+        return earlier(t, x, k, at, slope, skew)
+    return x[k] + (x_now - x[k]) * (at - t[k]) / (now - t[k])
 
 
 @_inline
@@ -265,7 +280,8 @@ def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide
         CURRENT, VOLTAGE, FORCE or SPEED_LOOP: what `drive` is (current, voltage, force, commanded speed).
     between : int
         STRAIGHT, HELD or HELD_BEFORE: from sample to sample the drive runs straight, holds the value of the first, or
-        that of the second. A commanded speed is held; its loop acts once a sample, or (FAST) between samples too.
+        that of the second. A commanded speed is held and its loop acts once a sample, or (FAST) between samples too,
+        or (ANALOGUE) the command runs straight as well.
     t, drive, load : arrays, shape (n_times,)
         Sample times, the recorded drive and the torque of a known load against positive motion.
     start : array, shape (5,)
@@ -314,8 +330,11 @@ def simulate_window(z, lines, terms, mode, between, t, drive, load, start, slide
             t_mid = t[k] + x * (t[k + 1] - t[k])
             z[LOAD] = load[k] + x * (load[k + 1] - load[k])
             if mode == SPEED_LOOP:
-                since = w + 0.5 * dw - out[1, k] if between == FAST else 0.0
-                wanted = min(max(asked - z[K_W] * since, -z[I_MAX]), z[I_MAX])
+                if between in (FAST, ANALOGUE):
+                    w_meas = delayed_between(t, out[1], k, t_mid, w + 0.5 * dw, z[SPEED_DELAY], slope, skew)
+                    further = x * (drive[k + 1] - drive[k]) if between == ANALOGUE else 0.0
+                    asked = z[K_W] * (drive[k] + further - w_meas)
+                wanted = min(max(asked, -z[I_MAX]), z[I_MAX])
                 i = wanted + (i_end - wanted) * (1.0 - kept) * z[LAG] / h  # mean over the step
                 i_end = wanted + (i_end - wanted) * kept
             else:

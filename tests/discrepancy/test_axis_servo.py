@@ -17,6 +17,7 @@ from ema.discrepancy.selection import fit_base, fit_with_each
 from ema.models.axis_config import RotaryAxis
 
 ACTS_BETWEEN = "the speed loop acts between the samples of the record too"
+COMMAND_TOO = "the speed loop and its command act between the samples of the record too"
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +35,13 @@ def test_how_often_a_speed_loop_acts_is_no_heavier_axis(servo, samples):
     assert outcome.verdict == "adequate"
     assert outcome.effects == []
     assert (ACTS_BETWEEN in outcome.notes) == (not samples)
+
+
+def test_a_command_that_runs_between_samples_is_no_heavier_axis(servo):
+    outcome = look(servo, servo.SPEED_LOOP, straight=True)
+    assert outcome.verdict == "adequate"
+    assert outcome.effects == []
+    assert COMMAND_TOO in outcome.notes
 
 
 @pytest.mark.slow

@@ -83,3 +83,22 @@ def test_in_a_speed_loop_the_current_lags():
     exact = step + (a @ np.exp(poles[:, None] * t)).real
     np.testing.assert_allclose(w, exact, atol=2e-3 * step)
     np.testing.assert_allclose(i, (a * poles @ np.exp(poles[:, None] * t)).real * J / k_t, atol=4e-3 * K_w * step)
+
+
+@pytest.mark.parametrize("between", ["fast", "analogue"])
+def test_a_speed_loop_that_acts_all_the_time_on_a_late_speed(between):
+    """Against steps a hundred times as fine as the samples of the record."""
+    J, k_t, K_w, late, period, n = 1e-3, 0.1, 0.5, 2.5e-3, 1e-3, 100
+    numbers = {"J": J, "F_d": 0.0, "k_t": k_t, "loop": {"K_w": K_w}, "effects": {"speed_delay": {"time": late}}}
+    plant = RotaryAxis.model_validate({"kind": "axis", "drive": "speed-loop", **numbers})
+    t = np.arange(300) * period
+    asked = 20.0 * np.sin(2.0 * np.pi * 5.0 * t)
+    command = np.repeat(asked, n) if between == "fast" else np.interp(np.arange(len(t) * n) * period / n, t, asked)
+    w = np.zeros(len(t) * n)
+    for k in range(len(w) - 1):
+        seen = w[k - round(late / period * n)] if k * period / n >= late else 0.0
+        w[k + 1] = w[k] + period / n * k_t / J * K_w * (command[k] - seen)
+    ends, start = np.array([0, len(t)]), np.zeros((1, 4))
+    found = axis.simulate(axis.model(plant), "speed-loop", ends, t, asked, start, period / 10, between=between)[1]
+    shown = np.interp(t - late, t, w[::n])
+    np.testing.assert_allclose(found, shown, atol=0.02 * np.abs(w).max())

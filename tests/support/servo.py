@@ -1,8 +1,8 @@
 """A servo whose controller is analogue, or samples; fine steps of Euler's. Shares no code with the models.
 
-The speed loop asks for i = K_w (ω_ref - ω) on a command that is held for each sample of the record. The position loop,
-whose current is recorded as the drive, is always analogue, its command too. Torque may saturate with the current cubed,
-and the current follow what is asked for with a lag.
+The speed loop asks for i = K_w (ω_ref - ω) on a command that is held for each sample of the record, or runs straight.
+The position loop, whose current is recorded as the drive, is always analogue, its command too. Torque may saturate with
+the current cubed, and the current follow what is asked for with a lag.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ CURRENT = {**PLANT, "drive": "current"}
 
 
 @njit(cache=True)
-def _run(command, is_position, samples, J, F, C, i_sat, lag, out):
+def _run(command, is_position, samples, straight, J, F, C, i_sat, lag, out):
     theta, w, i, asked, dt = 0.0, 0.0, 0.0, 0.0, 1.0 / (RATE * FINE)
     for k in range(len(command)):
         for s in range(FINE):
+            after = command[min(k + 1, len(command) - 1)]
+            wanted = command[k] + s / FINE * (after - command[k]) if is_position or straight else command[k]
             if is_position:
-                after = command[min(k + 1, len(command) - 1)]
-                asked = 6.0 * (command[k] + s / FINE * (after - command[k]) - theta) - 0.25 * w
+                asked = 6.0 * (wanted - theta) - 0.25 * w
             elif s == 0 or not samples:
-                asked = 0.4 * (command[k] - w)
+                asked = 0.4 * (wanted - w)
             i = asked if lag == 0.0 else i + dt / lag * (asked - i)
             if s == 0:
                 out[0, k], out[1, k], out[2, k] = theta, w, i
@@ -43,8 +44,8 @@ def _run(command, is_position, samples, J, F, C, i_sat, lag, out):
 
 
 def record(
-    seed: int, *, position: bool = False, samples: bool = False, inertia: float = 0.0085, i_sat: float = 1e9,
-    lag: float = 0.0, seconds: float = 12.0,
+    seed: int, *, position: bool = False, samples: bool = False, straight: bool = False,
+    inertia: float = 0.0085, i_sat: float = 1e9, lag: float = 0.0, seconds: float = 12.0,
 ) -> Record:  # fmt: skip
     """A record of several sines at once, to a speed loop or (as `i_q`) from a position loop."""
     rng = np.random.default_rng(seed)
@@ -53,7 +54,7 @@ def record(
     phases = rng.uniform(0.0, 6.0, 3)
     command = sum(a * np.sin(2.0 * np.pi * f * t + phi) for a, f, phi in zip(amplitudes, pace, phases, strict=True))
     out = np.zeros((3, len(t)))
-    _run(command, position, samples, inertia, 0.35, 0.004, i_sat, lag, out)
+    _run(command, position, samples, straight, inertia, 0.35, 0.004, i_sat, lag, out)
     theta = out[0] + 4e-4 * rng.standard_normal(len(t))
     w = out[1] + 0.03 * rng.standard_normal(len(t))
     drive = {"i_q": out[2]} if position else {"w_ref": command}

@@ -27,7 +27,8 @@ from ema.discrepancy.selection import ODDS, Tried, above_noise, compare, fit_bas
 from .plant import AxisPlant
 
 LATE = {"straight": 0.0, "held": 0.5, "held before": -0.5}  # samples by which the motion is later than straight
-LATE_IN_LOOP = {"straight": 0.5, "fast": 0.0}  # the same of a speed loop that acts once a sample, or all the time
+# The same of a speed loop that acts once a sample, or all the time, on a command that is held or runs straight.
+LATE_IN_LOOP = {"straight": 0.5, "fast": 0.0, "analogue": 0.0}
 DELAYS = {"position_delay.time": {"theta_m", "q"}, "speed_delay.time": {"w_m", "v"}}  # and the channels they are of
 OF_DRIVE = {"drive_lag.time": 0.0, "clock_skew.late": -np.inf}  # what else makes the motion late, and the least of it
 LEAST = {**dict.fromkeys(DELAYS, 0.0), **OF_DRIVE}
@@ -39,6 +40,7 @@ SAID = {
     "held": "between samples the recorded drive does not run straight: each value is held until the next",
     "held before": "between samples the recorded drive does not run straight: each value has been held since the last",
     "fast": "the speed loop acts between the samples of the record too",
+    "analogue": "the speed loop and its command act between the samples of the record too",
 }
 
 
@@ -138,10 +140,20 @@ def _is_no_worse(taken: Tried, further: Tried) -> bool:
 def _find_doubt(plant: AxisPlant, outcome: Outcome) -> str:
     """Another way that what was found, or not, may come from."""
     if plant.plant.drive == "speed-loop" and outcome.effects:
-        return "fast" if plant.between == "straight" else "straight"
+        return _likeliest_other(plant, outcome.model)
     if plant.between != "straight" and outcome.verdict in UNSOLVED:
         return "straight"  # what looked like a drive that is held may have been something that is missing
     return plant.between
+
+
+def _likeliest_other(plant: AxisPlant, model: Tried) -> str:
+    """Of the other ways, the one with which the same effects foretell most."""
+    here, tried = plant.between, {}
+    for way in _ways(plant).keys() - {here}:
+        plant.between = way
+        tried[way] = refit(plant, model)
+    plant.between = here
+    return max(tried, key=lambda way: compare(tried[way], model).gain)
 
 
 def _alike(one: Outcome, other: Outcome) -> bool:
