@@ -9,6 +9,8 @@ import click
 
 from ema.core.ranges import FiniteRange
 
+DRIVES = ("torque", "force", "i_q", "u_q", "duty", "w_ref", "current", "voltage", "speed-loop")
+
 
 def _positive(unit: str | None = None) -> FiniteRange:
     return FiniteRange(min=0, min_open=True, unit=unit)
@@ -29,6 +31,7 @@ def plant() -> None:
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="the plant file; must not exist")
 @click.option("--name", default="bench", show_default=True, help="what to call it")
 @click.option("--pole-pairs", type=click.IntRange(1, 200), help="data sheet")
+@click.option("--slots", type=click.IntRange(1, 1000), help="of the stator, data sheet")
 @click.option("--gear", type=_positive(), metavar="N", help="turns of the motor for one of the user, N:1")
 @click.option("--torque-at", type=click.Choice(["motor", "load"]), help="side of the gear of the torque sensor")
 @click.option("--measured-at", type=click.Choice(["motor", "load"]), help="side of the gear of position and speed")
@@ -37,7 +40,10 @@ def plant() -> None:
 @click.option("--kv", type=_positive("rpm/V"), metavar="RPM/V", help="speed constant, line to line [rpm/V]")
 @click.option("--k-t", "k_t", type=_positive("N m/A"), metavar="N·m/A", help="torque per amplitude of current [N m/A]")
 @click.option("--supply", "V_dc", type=_positive("V"), metavar="V", help="supply of which a duty cycle is a share [V]")
-@click.option("--drive", type=click.Choice(["torque", "force", "i_q", "u_q", "duty"]), help="where several may")
+@click.option("--K-w", "K_w", type=_positive(), metavar="A·S/RAD", help="current per speed error of a loop [A s/rad]")
+@click.option(
+    "--drive", type=click.Choice(DRIVES), help="a channel, or what it is in the plant file, where several may"
+)
 @click.option("--brushed", is_flag=True, help="a DC motor with brushes: k_e = k_t, not that of one of three phases")
 @click.option("--J", "J", type=_positive(), metavar="KG·M²", help="inertia or mass, where it is known [kg m^2, kg]")
 def init(

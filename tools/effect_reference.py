@@ -29,7 +29,8 @@ def _lines(effects: list[Effect]) -> Iterator[str]:
     yield "[the actuator](discrepancy.md)). At the value in *off* a plant is as without the effect. What lies beyond"
     yield "*searched* may be written into a plant file, but is not looked for on an actuator; on an axis a search goes"
     yield "as far as the sizes in its records ask. `ema discrepancy --explain NAME` tells of one of them why it is not"
-    yield "the answer. An indented line is what is simulated, as its file says it."
+    yield "the answer. An indented line is what is simulated, as its file says it. On a linear axis read m for rad,"
+    yield "N for N m and kg for kg m²; the user is what the output moves."
     for plant, name in PLANTS.items():
         own = [effect.name for effect in effects if plant in effect.plants]
         yield ""

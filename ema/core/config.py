@@ -117,7 +117,7 @@ def validate(data: Any, kind: type[S], where: str | Path) -> S:
     try:
         return kind.model_validate(data)
     except ValidationError as error:
-        raise ConfigError(f"{where}: {_describe(error)}") from error
+        raise ConfigError(f"{where}: {_describe(error, kind)}") from error
 
 
 def load(path: str | Path, kind: type[S]) -> S:
@@ -131,18 +131,35 @@ def digest(settings: Settings) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _describe(error: ValidationError) -> str:
+def _sections_with(kind: type[Settings], key: str) -> list[str]:
+    """Keys of `kind` whose value is a mapping that may hold `key`."""
+    return [
+        name
+        for name, field in kind.model_fields.items()
+        for own in (field.annotation, *get_args(field.annotation))
+        if isinstance(own, type) and issubclass(own, Settings) and key in own.model_fields
+    ]
+
+
+def _keyed(key: str, value: Any) -> str:
+    """A key and its value before what is wrong with it; nothing where it is the file as a whole, or a part of it."""
+    if isinstance(value, dict):
+        return f"key '{key}': " if key else ""
+    text = repr(value)
+    return f"key '{key}' = {text if len(text) <= 60 else text[:57] + '...'}: "
+
+
+def _describe(error: ValidationError, kind: type[Settings]) -> str:
     parts = []
     for e in error.errors()[:3]:
-        key = ".".join(str(part) for part in e["loc"]) or "(top level)"
+        key = ".".join(str(part) for part in e["loc"])
         if e["type"] == "extra_forbidden":
-            parts.append(f"key '{key}' is unknown")
+            within = _sections_with(kind, str(e["loc"][-1]))
+            parts.append(f"key '{key}' is unknown" + (f"; it belongs to '{within[0]}'" if within else ""))
         elif e["type"] == "missing":
             parts.append(f"key '{key}' is missing")
         else:
-            value = repr(e.get("input"))
-            value = value if len(value) <= 60 else value[:57] + "..."
             message = e["msg"].removeprefix("Value error, ")
-            parts.append(f"key '{key}' = {value}: {message[0].lower() + message[1:]}")
+            parts.append(f"{_keyed(key, e.get('input'))}{message[0].lower() + message[1:]}")
     more = error.error_count() - len(parts)
     return "; ".join(parts) + (f" (and {more} more)" if more > 0 else "")

@@ -84,6 +84,25 @@ CANNOT_BE = [
 ]
 
 
+def test_what_is_wrong_with_a_whole_file_is_told_without_the_file():
+    with pytest.raises(ConfigError, match=r"^here: drive: voltage needs R, k_e and k_t$"):
+        config.validate({"kind": "axis", "J": 1e-4, "F_d": 0.01, "drive": "voltage"}, axis_config.RotaryAxis, "here")
+
+
+def test_a_key_of_a_section_is_sent_there():
+    plant = {
+        "kind": "axis",
+        "J": 1e-4,
+        "F_d": 0.01,
+        "drive": "speed-loop",
+        "k_t": 0.1,
+        "loop": {"K_w": 1.0},
+        "I_max": 3.0,
+    }
+    with pytest.raises(ConfigError, match="'I_max' is unknown; it belongs to 'loop'"):
+        config.validate(plant, axis_config.RotaryAxis, "here")
+
+
 @pytest.mark.parametrize(
     ("load", "name"),
     [(actuator_file.load, "actuator.yaml"), (axis_config.load, "laas_mn4004.yaml")],

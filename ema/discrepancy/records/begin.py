@@ -1,6 +1,7 @@
 """The first plant file of a record: what a data sheet says, what the record shows, what is only a guess; each marked.
 
-What acts is k_t i_q, a measured torque or force, or k_t (u - k_e ω) / R by a voltage or a duty cycle of the supply.
+What acts is k_t i_q, a measured torque or force, k_t (u - k_e ω) / R by a voltage or a duty cycle of the supply, or
+k_t K_w (ω_ref - ω) of a speed loop.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from .agreements import agreements, derivative, smooth
 from .first_fit import FirstFit, first_fit
 
 POLE_PAIRS = range(1, 31)
+KINDS = {"i_q": "current", "u_q": "voltage", "duty": "voltage", "w_ref": "speed-loop"}  # of drive; others by their name
 COHERENT = 0.5  # share of the currents' vector that turns with the rotor, from which pole pairs can be told
 
 
@@ -36,11 +38,12 @@ class Sheet:
     """What a data sheet says; None where it does not. Units: rpm/V, ohm (phase), H (phase), kg m², N m/A, V.
 
     A `brushed` motor has the back-EMF constant of its torque; of three phases it is that of one. `drive` is the
-    channel that drives, where several may. `torque_at` and `measured_at` are sides of the gear: of a torque sensor, and
-    of position and speed.
+    channel that drives, where several may, or its kind. `K_w` is the gain of a speed loop. [A s/rad] `torque_at` and
+    `measured_at` are sides of the gear: of a torque sensor, and of position and speed.
     """
 
     pole_pairs: int | None = None
+    slots: int | None = None
     gear: float | None = None
     R: float | None = None
     L: float | None = None
@@ -48,6 +51,7 @@ class Sheet:
     k_t: float | None = None
     J: float | None = None
     V_dc: float | None = None
+    K_w: float | None = None
     brushed: bool = False
     drive: str | None = None
     torque_at: str | None = None
@@ -81,22 +85,23 @@ def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
     if not have & {position, speed}:
         raise RecordError(f"{records[0].name}: no motion: theta_m, w_m, q or v is wanted (has {there})")
     measured = "force" if linear else "torque"
-    drives = [name for name in (measured, "i_q", "u_q", "duty") if name in have]
-    if sheet.drive is not None and sheet.drive not in drives:
+    drives = [name for name in (measured, "i_q", "u_q", "duty", *(() if linear else ("w_ref",))) if name in have]
+    asked = [name for name in drives if sheet.drive in (None, name, KINDS.get(name))]
+    if sheet.drive is not None and not asked:
         raise RecordError(f"{records[0].name}: {sheet.drive} cannot drive: {' or '.join(drives) or 'nothing'} may")
-    drive = sheet.drive or next(iter(drives), None)
+    drive = next(iter(asked), None)
     if drive is None:
-        said = f"{records[0].name}: no drive: {measured}, i_q, u_q or duty is wanted (has {there})"
+        said = f"{records[0].name}: no drive: {measured}, i_q, u_q, duty or w_ref is wanted (has {there})"
         _, reference = LOOP_CHANNELS[linear]
         if reference in have:
             said += f"; a position_loop that makes it from {reference} is written by hand, see docs/axis.md"
         raise RecordError(said)
     known = [Known("kind", "axis", "")] + ([Known("motion", "linear", "")] if linear else [])
-    kind = {"i_q": "current", "u_q": "voltage", "duty": "voltage"}.get(drive, drive)
+    kind = KINDS.get(drive, drive)
     others = " or ".join(name for name in drives if name != drive)
     known.append(Known("drive", kind, f"by the channel {drive}{f'; {others} by --drive' if others else ''}"))
     k_t, k_e, whence = _constants(sheet)
-    if kind in ("current", "voltage"):
+    if kind in KINDS.values():
         known += [Known("k_t", _number(k_t, "N/A" if linear else "N m/A"), whence)]
     if kind == "voltage" or "u_q" in have:
         known += [Known("k_e", _number(k_e, "V s/m" if linear else "V s/rad"), f"{whence}{_of_phase(sheet)}")]
@@ -107,10 +112,26 @@ def begin_axis(records: Sequence[Record], sheet: Sheet) -> list[Known]:
             known.append(Known(key, "1 ohm", "a guess: give --R"))
         elif key == "V_dc" and drive == "duty" and "u_dc" not in have:
             known.append(Known(key, "24 V", "a guess: give --supply"))
+    if kind == "speed-loop":
+        gain, whence = (1.0, "a guess: give --K-w") if sheet.K_w is None else (sheet.K_w, "data sheet")
+        known.append(
+            Known("loop", f"{{K_w: {_number(gain, 'A s/rad')}}}", f"{whence}; its limit: {{K_w: …, I_max: …}}")
+        )
     if "theta_n" in have:
         known.append(Known("neighbour", "inner", "a guess: outer where theta_n is of the link that hangs on this one"))
     fit = first_fit(records, position, speed, _torques(records, drive, position, speed, sheet, k_t, k_e))
-    return [*known, *_mechanical(fit, sheet, drive, linear=linear)]
+    untold = _untold(sheet, drive, supply_recorded="u_dc" in have)
+    return [*known, *_mechanical(fit, sheet, drive, untold, linear=linear)]
+
+
+def _untold(sheet: Sheet, drive: str, *, supply_recorded: bool) -> str:
+    """The options without which the torque is not known, where one is wanted."""
+    wanted = {
+        "--supply": drive == "duty" and sheet.V_dc is None and not supply_recorded,
+        "--R": drive in ("u_q", "duty") and sheet.R is None,
+        "--K-w": drive == "w_ref" and sheet.K_w is None,
+    }
+    return " and ".join(option for option, is_wanted in wanted.items() if is_wanted)
 
 
 def _gear(sheet: Sheet, drive: str) -> list[Known]:
@@ -125,11 +146,12 @@ def _gear(sheet: Sheet, drive: str) -> list[Known]:
     return known
 
 
-def _mechanical(fit: FirstFit, sheet: Sheet, drive: str, *, linear: bool) -> list[Known]:
+def _mechanical(fit: FirstFit, sheet: Sheet, drive: str, untold: str, *, linear: bool) -> list[Known]:
     """Inertia, drag and friction, each with where it is from."""
     mass, unit = ("M", "kg") if linear else ("J", "kg m^2")
     beside = f", beside a torque of order {', '.join(f'{n:g}' for n in fit.orders)}" if fit.orders else ""
-    fitted, guess = f"fitted to the records, a start{beside}", "a guess: the records do not show it"
+    fitted = f"fitted to the records, a start{beside}"
+    guess = f"a guess: the records may show it with {untold}" if untold else "a guess: the records do not show it"
     known = []
     for key, its, value, otherwise, given in (
         (mass, unit, fit.inertia, 1e-4, sheet.J),
@@ -139,10 +161,13 @@ def _mechanical(fit: FirstFit, sheet: Sheet, drive: str, *, linear: bool) -> lis
         origin = "data sheet" if given is not None else fitted if value is not None else guess
         known.append(Known(key, _number(next(x for x in (given, value, otherwise) if x is not None), its), origin))
     known += [] if sheet.gear is None else _gear(sheet, drive)
-    if sheet.pole_pairs and not linear:
-        known.append(Known("p", str(sheet.pole_pairs), "data sheet"))
+    for key, number in (("p", sheet.pole_pairs), ("slots", sheet.slots)):
+        if number and not linear:
+            known.append(Known(key, str(number), "data sheet"))
     free = [mass] * (sheet.J is None) + ["C"] * (fit.drag is not None)  # a start is no number to hold on to
-    known.append(Known("fitted", f"[{', '.join(free)}]", "what `ema discrepancy` fits in every model"))
+    known.append(
+        Known("fitted", f"[{', '.join(free)}]", "fitted in every model: no finding is of these; take out what you know")
+    )
     return known
 
 
@@ -201,6 +226,9 @@ def _torques(
     load = LOAD_CHANNEL[position == "q"]
 
     def of(cycle: Cycle) -> Array:
+        if drive == "w_ref":
+            w = smooth(cycle[speed]) if speed in cycle else derivative(cycle, position)
+            return np.asarray(k_t * (sheet.K_w or 0.0) * (cycle[drive] - w))
         if drive not in ("u_q", "duty"):
             return cycle[drive] * {"i_q": k_t, "torque": sheet.torque_ratio}.get(drive, 1.0)
         supply = 1.0 if drive == "u_q" else cycle.channels.get("u_dc", sheet.V_dc)

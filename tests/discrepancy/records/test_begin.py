@@ -168,3 +168,34 @@ def test_a_load_cell_beside_a_current_is_no_drive_and_its_load_no_friction(tmp_p
     assert plant.drive == "current"
     assert pytest.approx(J, rel=0.05) == plant.J
     assert pytest.approx(F_D, rel=0.2) == plant.F_d
+
+
+def speed_loop_bench(gain=0.5):
+    """The bench driven by a speed loop: what it was commanded, by the current that flowed."""
+    cycle = bench().cycles[0]
+    return Record((Cycle(0, {"t": cycle["t"], "w_m": cycle["w_m"], "w_ref": cycle["w_m"] + cycle["i_q"] / gain}),))
+
+
+def test_a_speed_loop_drives(tmp_path):
+    path = init(speed_loop_bench(), tmp_path, "--k-t", str(K_T), "--K-w", "0.5")
+    plant = axis_config.load(path)
+    assert plant.drive == "speed-loop"
+    assert plant.loop.K_w == 0.5
+    assert pytest.approx(J, rel=0.05) == plant.J
+    assert pytest.approx(F_D, rel=0.2) == plant.F_d
+
+
+def test_a_number_that_waits_for_another_says_so(tmp_path):
+    text = init(speed_loop_bench(), tmp_path, "--k-t", str(K_T)).read_text()
+    lines = {line.split(":")[0]: line for line in text.splitlines()}
+    assert "give --K-w" in lines["loop"]
+    assert all("a guess: the records may show it with --K-w" in lines[key] for key in ("J", "C", "F_d"))
+
+
+@pytest.mark.parametrize("said", ["voltage", "u_q"])
+def test_a_drive_is_said_by_its_channel_or_its_kind(said, tmp_path):
+    cycle = bench().cycles[0]
+    channels = {**cycle.channels, "u_q": cycle["i_q"] + K_T * cycle["w_m"]}
+    options = ("--k-t", str(K_T), "--R", "1", "--brushed", "--drive", said, "--slots", "24")
+    plant = axis_config.load(init(Record((Cycle(0, channels),)), tmp_path, *options))
+    assert (plant.drive, plant.slots) == ("voltage", 24)
