@@ -35,7 +35,7 @@ MAX_ADDED = 5  # of both kinds, further lines of a kind that is there already co
 IMMATERIAL = 0.01  # of the noise's mean square: what takes less is told, and no cause: no plant file is that exact
 MANY = 12  # free parameters from which an effect is revised beside its strongest rivals only
 N_RIVALS = 6
-N_SETS = 2  # of each size that should explain most in the place of what was found one by one, which are fitted
+N_SETS = 2  # of each size that should explain most in the place of what was found one by one, and are fitted
 
 
 Reread = Callable[[Tried, Tried], bool]
@@ -187,7 +187,7 @@ def try_sets(plant: Plant, state: State, progress: Progress) -> State:
         for keys in _instead(plant, state, trials, before):
             progress(" + ".join((*(c.key for c in before.accepted), *keys)))
             state.besides.append(superpose(plant, before, [trials[key] for key in keys]))
-    best = find_likeliest((state.model, *state.besides))
+    best = find_likeliest(state.model, state.besides)
     if best is state.model:
         return state
     besides = [t for t in (state.model, *state.besides) if t is not best]
@@ -200,21 +200,23 @@ def try_sets(plant: Plant, state: State, progress: Progress) -> State:
 
 
 def _instead(plant: Plant, state: State, trials: dict[str, Tried], before: Tried) -> list[tuple[str, ...]]:
-    """What to add to the model `before`, of what was tried there: the best sets of each size that were not fitted.
+    """What to add to the model `before`, of what was tried there: sets that were not fitted, the best of each size.
 
-    None that holds the model, beside which no further effect was worth it.
+    And the best without each of the model's effects. None holds all of these: beside them no further one was worth it.
     """
     fitted = [before, *(t for of, _ in state.rounds for t in of.values()), *state.besides]
     known = [{c.key for c in t.accepted} for t in fitted]
     model, there = ({c.key for c in t.accepted} for t in (state.model, before))
     fits = {key: t.fits for key, t in trials.items() if not is_nameless(key, t)}
-    chosen: dict[int, list[tuple[str, ...]]] = {}
-    for _, keys in rank_sets(plant, before.fits, fits, MAX_EFFECTS - len(there)):
-        of_size = chosen.setdefault(len(keys), [])
-        own = there | set(keys)
-        if len(of_size) < N_SETS and not own >= model and own not in known:
-            of_size.append(keys)
-    return [keys for of_size in chosen.values() for keys in of_size]
+    ranked = [keys for _, keys in rank_sets(plant, before.fits, fits, MAX_EFFECTS - len(there))]
+    ranked = [keys for keys in ranked if there | set(keys) not in known and not there | set(keys) >= model]
+    chosen: list[tuple[str, ...]] = []
+    for n in range(2, MAX_EFFECTS - len(there) + 1):
+        of_size = [keys for keys in ranked if len(keys) == n]
+        chosen += of_size[:N_SETS]
+        for key in sorted(model - there):
+            chosen += [keys for keys in of_size if key not in keys][:1]
+    return list(dict.fromkeys(chosen))
 
 
 def _strongest(trials: dict[str, Tried], before: Tried) -> set[str]:

@@ -142,10 +142,12 @@ def add_prior(score: float, tried: Tried) -> float:
     return score + log_odds(PRIOR) * len(tried.accepted)
 
 
-def find_likeliest(sets: Sequence[Tried]) -> Tried:
-    """The set of effects with the largest evidence."""
-    scale = min(t.scale for t in sets)
-    return max(sets, key=lambda t: add_prior(float(log_scores(t, scale).sum()), t))
+def find_likeliest(model: Tried, others: Sequence[Tried]) -> Tried:
+    """The set of effects with the largest evidence: `model` where no other's is larger by `BETTER`."""
+    scale = min(t.scale for t in (model, *others))
+    evidence = [add_prior(float(log_scores(t, scale).sum()), t) for t in (model, *others)]
+    best = int(np.argmax(evidence))
+    return others[best - 1] if evidence[best] > evidence[0] + BETTER else model
 
 
 def list_folds(plant: Plant) -> list[tuple[list[int], list[int]]]:

@@ -17,9 +17,11 @@ def test_what_a_gear_loses_is_of_the_load_and_of_the_inertia_behind_it(support):
     plant = AxisPlant(RotaryAxis.model_validate(geared.plant(axis)), [geared.record(axis, 1, size=2.0)], n_threads=1)
     found = findings(plant, examine_ways(plant))
     named = {e.name: e for e in found.effects}
-    assert set(named) == {"pendulum", "output_load_friction"}
-    assert named["output_load_friction"].confidence > 0.9
-    told = named["output_load_friction"].parameters
+    lost = named.pop("output_load_friction")
+    (hangs,) = named.values()
+    assert "pendulum" in {hangs.name, *hangs.indistinguishable_from}  # or another torque once per turn: the same law
+    assert lost.confidence > 0.9
+    told = lost.parameters
     for name, true in (("share", 0.2), ("of_inertia", 0.8)):
         assert told[name].low <= true <= told[name].high
         assert told[name].value == pytest.approx(true, rel=0.1)

@@ -24,3 +24,8 @@ def left_of_noise(width: int, degree: int = 2) -> float:
     It is also what the sample and the smoothed one have in common: their difference has the rest.
     """
     return float(savgol_coeffs(width, degree)[width // 2])
+
+
+def slope_of_noise(width: int, dt: float, degree: int = 2) -> float:
+    """Noise of a smoothed slope, per noise of one sample."""
+    return float(np.linalg.norm(savgol_coeffs(width, degree, deriv=1, delta=dt)))

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
+from scipy.ndimage import maximum_filter1d
 
 from ema.core.errors import RecordError
 from ema.core.records import Array, Cycle, Record
@@ -16,7 +17,7 @@ from ema.models.axis_config import Axis
 
 from .channels import MIN_SAMPLES, Roles, find_runs, known_load, roles
 from .jumps import measure_jumps
-from .local_polynomials import left_of_noise, smooth
+from .local_polynomials import left_of_noise, slope_of_noise, smooth
 from .noise import ESTIMATE_UNCERTAINTY, Noise, estimate, is_derived
 from .pushed import pushed
 from .quiet_drive import quieten
@@ -206,7 +207,11 @@ def _moving(plant: Axis, length: float, group: str, cycle: Cycle, who: Roles, no
     of_drive = pushed(plant, who.kind)[0] * noise[who.drive].rms(np.gradient(cycle[who.drive], t))
     jolted = of_drive * dt * np.sqrt(2 * margin + 1)  # one deviation of what its noise makes of a speed meanwhile
     seen = np.hypot(AT_REST * START_NOISE * speed_noise(who, noise, dt), jolted)
-    still = np.abs(speed) < seen + np.abs(speed - narrow)  # an axis that stops for a moment is smoothed to a slow one
+    still = np.abs(speed) < seen
+    # An axis that stops for a moment and goes on the same way is smoothed to a slow one.
+    off, of_noise = np.abs(speed - narrow), AT_REST * _narrow_noise(who, noise, dt)
+    turning = maximum_filter1d(np.abs(np.diff(np.sign(speed), append=np.sign(speed[-1:]))), 2 * margin + 1) > 0.0
+    still |= ~turning & (off > of_noise) & (np.abs(speed) < seen + off)
     rests = _rests(still | _reversals(speed), margin)
     turns = np.flatnonzero(np.diff(np.sign(speed)) != 0.0) + 1
     anew = np.unique(np.concatenate(([0], cuts, gaps, np.flatnonzero(still) + 1, turns)))  # what was before is no lead
@@ -278,6 +283,13 @@ def _width(x: Array, gaps: NDArray[np.int_], sigma: Array, widths: tuple[int, ..
 def speed_noise(who: Roles, noise: dict[str, Noise], period: float) -> float:
     """Noise of one sample of the speed; where it is derived, from that of the position."""
     return noise[who.speed].sigma if who.speed is not None else noise[str(who.position)].sigma / (HALF * period)
+
+
+def _narrow_noise(who: Roles, noise: dict[str, Noise], period: float) -> float:
+    """Noise of the speed as smoothed over the fewest samples."""
+    if who.speed is not None:
+        return noise[who.speed].sigma * float(np.sqrt(left_of_noise(WIDTHS[-1])))
+    return noise[str(who.position)].sigma * slope_of_noise(2 * WIDTHS[-1] - 1, period)
 
 
 def _rests(still: NDArray[np.bool_], margin: int) -> NDArray[np.int_]:
