@@ -113,6 +113,8 @@ def _lost(state: State, weighed: Weighed) -> list[dict[str, Any]]:
     """Effects of the library that were tried in the place of one that is named, gain by more than chance, and lost."""
     rows: dict[str, dict[str, Any]] = {}
     for own, (trials, before) in zip(state.model.accepted, state.rounds, strict=True):
+        if not trials:  # a term without a name, of a set that was fitted as a whole
+            continue
         scale = min(t.scale for t in trials.values())
         told = {*weighed.instead(own.key), *(c.key for c in state.model.accepted)}
         for key, trial in trials.items():
