@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import binomtest
@@ -83,3 +85,21 @@ def test_two_that_do_the_same_have_no_amplitudes_of_their_own():
     ranked = rank_sets(toy, plain.fits, alone, 2)
     assert {frozenset(names) for _, names in ranked[:2]} == {frozenset("ac"), frozenset("bc")}
     assert dict((frozenset(n), x) for x, n in ranked)[frozenset("ab")] > 1.2
+
+
+class BesideATerm(Common):
+    """The same, where `e` is the largest and has no name in the library."""
+
+    def candidates(self, point, blocks):
+        return [c for c in super().candidates(point, blocks) if c.key != "e"]
+
+    def structure(self, point, blocks):
+        return [replace(c, is_structure=True) for c in super().candidates(point, blocks) if c.key == "e"]
+
+
+def test_a_set_beside_a_larger_term_without_a_name_is_told_and_not_named():
+    """What only that term explains is unknown, and more than what the two do."""
+    found = examine(BesideATerm(1, a=1.0, b=1.0, e=3.0))
+    assert found.verdict == "unexplained"
+    assert found.effects == []
+    assert {"a", "b"} <= {row["name"] for row in found.lost}
