@@ -225,18 +225,19 @@ def _torques(
     """The drive's torque less a known load, by record and cycle; zeros for what a voltage does not tell of it."""
     load = LOAD_CHANNEL[position == "q"]
 
+    def moving(cycle: Cycle) -> Array:
+        return smooth(cycle[speed]) if speed in cycle else derivative(cycle, position)
+
     def of(cycle: Cycle) -> Array:
         if drive == "w_ref":
-            w = smooth(cycle[speed]) if speed in cycle else derivative(cycle, position)
-            return np.asarray(k_t * (sheet.K_w or 0.0) * (cycle[drive] - w))
+            return np.asarray(k_t * (sheet.K_w or 0.0) * (cycle[drive] - moving(cycle)))
         if drive not in ("u_q", "duty"):
             return cycle[drive] * {"i_q": k_t, "torque": sheet.torque_ratio}.get(drive, 1.0)
         supply = 1.0 if drive == "u_q" else cycle.channels.get("u_dc", sheet.V_dc)
         if sheet.R is None or supply is None:
             return np.zeros(cycle.n_samples)
         u = cycle[drive] * supply
-        w = smooth(cycle[speed]) if speed in cycle else derivative(cycle, position)
-        return np.asarray(k_t * (u - k_e * w) / sheet.R)
+        return np.asarray(k_t * (u - k_e * moving(cycle)) / sheet.R)
 
     return [[of(cycle) - sheet.load_ratio * known_load(cycle, load) for cycle in record] for record in records]
 

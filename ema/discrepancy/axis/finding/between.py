@@ -149,7 +149,7 @@ def _find_doubt(plant: AxisPlant, outcome: Outcome) -> str:
 def _likeliest_other(plant: AxisPlant, model: Tried) -> str:
     """Of the other ways, the one with which the same effects foretell most."""
     here, tried = plant.between, {}
-    for way in _ways(plant).keys() - {here}:
+    for way in [way for way in _ways(plant) if way != here]:
         plant.between = way
         tried[way] = refit(plant, model)
     plant.between = here
