@@ -123,7 +123,8 @@ def add_by_noise(plant: Plant, point: Point, blocks: Sequence[int], residuals: S
     return [np.clip(b - a, -HUBER, HUBER) for a, b in zip(residuals, again, strict=True)]
 
 
-def _flat(residuals: Sequence[Array]) -> Array:
+def flatten(residuals: Sequence[Array]) -> Array:
+    """Residuals of all blocks, one after the other, shape (n_rows,)."""
     return np.concatenate([block.ravel() for block in residuals])
 
 
@@ -140,7 +141,7 @@ def jacobian(
         steps.append(step)
     if not points:
         return np.empty((0 if here is None else len(here), 0))
-    runs = [_flat(r) for r in plant.residuals(points, blocks)]
+    runs = [flatten(r) for r in plant.residuals(points, blocks)]
     here = here if here is not None else runs.pop(0)
     return np.stack([(run - here) / step for run, step in zip(runs, steps, strict=True)], axis=1)
 
@@ -299,7 +300,7 @@ def fit(
     """
     of = _Objective(plant, tuple(free), start, tuple(blocks), frozen)
     x, run = of.x0, of.run0
-    rows = _flat([*run[0], *run[1]])
+    rows = flatten([*run[0], *run[1]])
     here, damping = of.loss(rows, x), 1e-3
     J = of.slopes(x, rows)
     moved = of.moved(J, rows)
@@ -309,7 +310,7 @@ def fit(
         for _ in range(N_DAMPINGS):
             x_new = np.clip(x + _step(A, g, damping, ~held) * of.scales, of.low, of.high)
             trial = of.run(x_new)
-            rows_new = _flat([*trial[0], *trial[1]])
+            rows_new = flatten([*trial[0], *trial[1]])
             there = of.loss(rows_new, x_new)
             if there < here:
                 break

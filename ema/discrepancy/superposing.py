@@ -13,7 +13,7 @@ import numpy as np
 
 from ema.core.records import Array
 
-from .fitting import Fit, jacobian
+from .fitting import Fit, flatten, jacobian
 from .plant import Plant
 
 REACH = 10.0  # times what it is alone, up to which an effect is taken as linear
@@ -34,7 +34,7 @@ def rank_sets(
     left = np.zeros(len(sets))
     n_rows = 0
     for k, own in enumerate(before):
-        here = _rows(own)
+        here = flatten(own.residuals)
         known, _ = np.linalg.qr(jacobian(plant, own.free, own.point, own.blocks, here))
         marks = np.array([_mark(plant, own, trials[key][k], here) for key in keys])
         marks -= (marks @ known) @ known.T
@@ -50,16 +50,12 @@ def _mark(plant: Plant, before: Fit, own: Fit, here: Array) -> Array:
 
     A supply does not sag by less than nothing, and by itself it may have to where a magnet is weak too.
     """
-    mark = _rows(own) - here
+    mark = flatten(own.residuals) - here
     if mark @ mark > NOTHING:
         return mark
     begun = {f.name: f.start for f in own.free if f.name not in before.point}
     (at_start,) = plant.residuals([{**own.point, **before.point, **begun}], before.blocks)
-    return np.concatenate([r.ravel() for r in at_start]) - here
-
-
-def _rows(fitted: Fit) -> Array:
-    return np.concatenate([r.ravel() for r in fitted.residuals])
+    return flatten(at_start) - here
 
 
 def _least(products: Array, with_residual: Array, square: float, sets: Sequence[tuple[int, ...]]) -> Array:
