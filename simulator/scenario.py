@@ -93,7 +93,7 @@ class Scenario(Settings):
     def _numbers_differ(self) -> Scenario:
         numbers = [a.number for a in self.actuators]
         if not numbers or len(set(numbers)) < len(numbers):
-            raise ValueError(f"each actuator needs a number of its own, got {numbers}")
+            raise ValueError(f"actuators: each needs a number of its own, got {numbers}")
         return self
 
 

@@ -142,11 +142,9 @@ def _sections_with(kind: type[Settings], key: str) -> list[str]:
 
 
 def _keyed(key: str, value: Any) -> str:
-    """A key and its value before what is wrong with it; nothing where it is the file as a whole, or a part of it."""
-    if isinstance(value, dict):
-        return f"key '{key}': " if key else ""
+    """A key and its value before what is wrong with it; nothing where it is the file as a whole."""
     text = repr(value)
-    return f"key '{key}' = {text if len(text) <= 60 else text[:57] + '...'}: "
+    return f"key '{key}' = {text if len(text) <= 60 else text[:57] + '...'}: " if key else ""
 
 
 def _describe(error: ValidationError, kind: type[Settings]) -> str:
