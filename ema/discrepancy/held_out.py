@@ -26,7 +26,7 @@ def training_errors(plant: Plant, plain: Tried, model: Tried) -> tuple[float, fl
 
 def over_folds(plant: Plant, plain: Tried, model: Tried) -> Folds:
     """Errors before and after of every part of the records, each by the fits that had not seen it."""
-    parts = _parts(plant)
+    parts = list_parts(plant)
     rows = [(name, *_of_part(plant, plain, model, blocks)) for name, _, blocks in parts]
     names, before, after, floor, weight = zip(*rows, strict=True)
     of_group: dict[str, float] = {}
@@ -38,7 +38,7 @@ def over_folds(plant: Plant, plain: Tried, model: Tried) -> Folds:
 
 def residual_over_folds(plant: Plant, plain: Tried, model: Tried) -> Folds:
     """Mean squares of the whitened residual of every part, each by the fits that had not seen it; noise makes one."""
-    parts = _parts(plant)
+    parts = list_parts(plant)
     before, after = ([_rms(t, blocks) ** 2 for _, _, blocks in parts] for t in (plain, model))
     n = tuple(float(sum(model.held_out[j].size for j in blocks)) for _, _, blocks in parts)
     return Folds(tuple(name for name, _, _ in parts), tuple(before), tuple(after), (1.0,) * len(parts), n)
@@ -71,8 +71,8 @@ def _errors(plant: Plant, model: Tried, blocks: set[int]) -> list[Errors]:
     return found
 
 
-def _parts(plant: Plant) -> list[tuple[str, str, set[int]]]:
-    """Name, record and blocks of each part."""
+def list_parts(plant: Plant) -> list[tuple[str, str, set[int]]]:
+    """Name, record and blocks of each part of the records."""
     groups = list(dict.fromkeys(b.group for b in plant.blocks))
     n_each = max(1, N_PARTS // len(groups))
     parts = []

@@ -215,7 +215,7 @@ def _instead(plant: Plant, state: State, trials: dict[str, Tried], before: Tried
         of_size = [keys for keys in ranked if len(keys) == n]
         chosen += of_size[:N_SETS]
         for key in sorted(model - there):
-            chosen += [keys for keys in of_size if key not in keys][:1]
+            chosen += [keys for keys in of_size if key not in keys][:N_SETS]
     return list(dict.fromkeys(chosen))
 
 

@@ -56,6 +56,9 @@ class Columns:
             for point in points
         ]
 
+    def free_run_errors(self, point, blocks):
+        return [r[0] for r in self.residuals([point], blocks)[0]]
+
     def tried(self, *names):
         """The model with these effects, each as large as its column is."""
         candidates = [Candidate(n, n, (Free(n, "1", -5.0, 5.0, 1.0, 0.1),), ({n: 1.0},)) for n in names]

@@ -53,6 +53,9 @@ class Toy:
         r = np.concatenate([x.ravel() for x in self.residuals([point], blocks)[0]])
         return Errors(float(np.sqrt(np.mean(r**2))), QUIET, float(len(r)))
 
+    def free_run_errors(self, point, blocks):
+        return [x.ravel() for x in self.residuals([point], blocks)[0]]
+
     def describe(self, candidates, point, draw):
         drawn = draw(50)
         return [

@@ -219,14 +219,10 @@ class AxisPlant:
         drifts = self._drifts(point, blocks, fitted)
         for j, r, drift in zip(blocks, self.free_run(point, blocks), drifts, strict=True):
             main = self.main_row(j)
-            y = self.windows[j].outputs[main]
             r, floor = without_start(self.plant, self._bench_of[j], self.windows[j], r)
             floor = floor + drift
-            is_position = not self.windows[j].static and self._bench_of[j].roles.speed is None
-            power = float(np.var(y)) if is_position else float(np.mean(y**2))
-            squares.setdefault(self.windows[j].group, []).append(
-                (float(np.mean(r[main] ** 2)), float(np.mean(floor[main])), power, len(y))
-            )
+            of = (float(np.mean(r[main] ** 2)), float(np.mean(floor[main])), self._power(j), self.windows[j].n)
+            squares.setdefault(self.windows[j].group, []).append(of)
         shares, weight = [], 0.0
         for parts in squares.values():
             error, noise, power, n = np.array(parts).T
@@ -234,6 +230,21 @@ class AxisPlant:
             weight += float(power @ n)
         error, noise = np.sqrt(np.mean(shares, axis=0))
         return Errors(float(error), float(noise), weight)
+
+    def free_run_errors(self, point: Point, blocks: Sequence[int]) -> list[Array]:
+        """Error of the main output in each block, (n_times,), less its start's, over the root of its record's power."""
+        of: dict[str, float] = {}
+        for j, w in enumerate(self.windows):
+            of[w.group] = of.get(w.group, 0.0) + self._power(j) * w.n
+        runs = zip(blocks, self._less_start(point, blocks), strict=True)
+        return [r[self.main_row(j)] / max(of[self.windows[j].group], 1e-300) ** 0.5 for j, r in runs]
+
+    def _power(self, block: int) -> float:
+        """Mean square of the main output, of a position about its mean."""
+        w = self.windows[block]
+        y = w.outputs[self.main_row(block)]
+        is_position = not w.static and self._bench_of[block].roles.speed is None
+        return float(np.var(y)) if is_position else float(np.mean(y**2))
 
     def _drifts(self, point: Point, blocks: Sequence[int], fitted: Fitted | None) -> list[Array]:
         """Variance that the fitted parameters' own makes of free runs, (n_channels, n_times) by block: diag J Σ Jᵀ"""
