@@ -141,6 +141,10 @@ class Plant(Protocol):
         """Error of the simulation and its noise floor, which holds what noise made of the parameters at `point`."""
         ...
 
+    def is_of_sensor(self, candidate: Candidate) -> bool:
+        """Whether it moves nothing, and is told by what one sensor shows beside another."""
+        ...
+
     def free_run_errors(self, point: Point, blocks: Sequence[int]) -> list[Array]:
         """Error of the simulation in each block, scaled so that squares add to the relative error of its record."""
         ...

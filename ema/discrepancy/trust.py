@@ -93,7 +93,8 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
     The mark of an effect is what the mean square of the held-out residual loses by it. Beside it stand what is left
     unexplained, what only nameless terms explain, and what the other effects' laws may miss by having the wrong form:
     any of them may be what the effect is mistaken for. Of the last, as much as looks like it (`looks_like`), and no
-    more than what is left allows. And an effect is trusted no further than free runs bear it out.
+    more than what is left allows. And an effect that moves something is trusted no further than free runs bear it
+    out.
     """
     accepted = state.model.accepted
     terms = {k for k, c in enumerate(accepted) if c.is_structure}
@@ -111,8 +112,9 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
         for o in [other for other in marks if other != key]:
             form += made_by_form(looks_like(made[key], made[o]), marks[o], left)
         trust[key] = mark / (mark + unknown + form) if mark > 0.0 else 0.0
-        trust[key] *= most_borne_out(plant, befores[key], state.model)
     for c in accepted:
+        if c.key in trust and not plant.is_of_sensor(c):
+            trust[c.key] *= most_borne_out(plant, befores[c.key], state.model)
         if c.key in trust and _leans(state.model.fits[0], c):
             trust[c.key] *= 0.5
     return trust

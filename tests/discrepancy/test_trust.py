@@ -56,6 +56,9 @@ class Columns:
             for point in points
         ]
 
+    def is_of_sensor(self, candidate):
+        return False
+
     def free_run_errors(self, point, blocks):
         return [r[0] for r in self.residuals([point], blocks)[0]]
 

@@ -53,6 +53,9 @@ class Toy:
         r = np.concatenate([x.ravel() for x in self.residuals([point], blocks)[0]])
         return Errors(float(np.sqrt(np.mean(r**2))), QUIET, float(len(r)))
 
+    def is_of_sensor(self, candidate):
+        return False
+
     def free_run_errors(self, point, blocks):
         return [x.ravel() for x in self.residuals([point], blocks)[0]]
 

@@ -16,7 +16,7 @@ from ema.discrepancy.axis.balance.records.course import courses
 from ema.discrepancy.axis.balance.records.of_records import balance, plain_of
 from ema.discrepancy.axis.balance.records.own_zeros import refine_zeros
 from ema.discrepancy.axis.balance.regressing.found import Balance
-from ema.discrepancy.axis.naming.naming import numbers_of
+from ema.discrepancy.axis.naming.naming import OF_MOTION, numbers_of
 from ema.discrepancy.axis.reading.intake import take_in
 from ema.discrepancy.axis.reading.lateness import see_delays
 from ema.discrepancy.axis.reading.measured import Zero
@@ -231,6 +231,10 @@ class AxisPlant:
             weight += float(power @ n)
         error, noise = np.sqrt(np.mean(shares, axis=0))
         return Errors(float(error), float(noise), weight)
+
+    def is_of_sensor(self, candidate: Candidate) -> bool:
+        """Whether it is of a sensor of the motion, beside which another is recorded."""
+        return candidate.effect in OF_MOTION and any(len(b.roles.outputs) > 1 for b in self.benches)
 
     def free_run_errors(self, point: Point, blocks: Sequence[int]) -> list[Array]:
         """Error of the main output in each block, (n_times,), less its start's, over the root of its record's power."""

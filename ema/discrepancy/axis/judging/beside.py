@@ -15,7 +15,7 @@ import numpy as np
 from ema.core.records import Array, Cycle
 from ema.discrepancy.axis.balance.records.of_records import balance
 from ema.discrepancy.axis.balance.regressing.found import Balance
-from ema.discrepancy.axis.naming.naming import numbers_of
+from ema.discrepancy.axis.naming.naming import OF_MOTION, numbers_of
 from ema.discrepancy.plant import Point
 from ema.models import axis
 
@@ -23,10 +23,7 @@ if TYPE_CHECKING:
     from ema.discrepancy.axis.finding.plant import AxisPlant
     from ema.discrepancy.axis.reading.windows import Bench
 
-OF_SENSORS = (
-    *("position_delay", "speed_delay", "clock_skew", "resolver_error", "encoder_error"),
-    *("drive_lag", "drive_filter"),
-)
+OF_SENSORS = (*OF_MOTION, "clock_skew", "drive_lag", "drive_filter")
 
 
 def balance_beside(plant: AxisPlant, point: Point) -> Balance | None:

@@ -23,6 +23,7 @@ from ema.models.axis_config import INSTANCE, LINES
 if TYPE_CHECKING:
     from ema.discrepancy.plant import Point
 
+OF_MOTION = ("position_delay", "speed_delay", "resolver_error", "encoder_error")  # effects of its sensors
 PARAMETERS = ("J", "M", "C", "F_d", "k_t", "k_e", "R", "L")
 
 
