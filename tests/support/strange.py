@@ -17,9 +17,9 @@ from ema.core.records import Cycle, Record
 FINE, HZ = 50, 1000
 KINDS = (
     *("nothing", "cushion", "gap", "maxwell_slip", "current_ripple", "friction_twice", "crank", "heat", "clutch"),
-    *("current_lag", "one_way_fan", "gusts", "load_step", "dwell", "centrifugal"),
+    *("current_lag", "one_way_fan", "gusts", "load_step", "dwell", "centrifugal", "shaken"),
 )
-(NOTHING, CUSHION, GAP, SLIP, RIPPLE, TWICE, CRANK, HEAT, CLUTCH, LAG, FAN, GUSTS, STEP, DWELL, BRAKE) = range(
+(NOTHING, CUSHION, GAP, SLIP, RIPPLE, TWICE, CRANK, HEAT, CLUTCH, LAG, FAN, GUSTS, STEP, DWELL, BRAKE, SHAKEN) = range(
     len(KINDS)
 )
 
@@ -57,6 +57,7 @@ def sizes(kind: int, axis: Axis, rng: np.random.Generator) -> tuple[float, float
         STEP: (rng.uniform(0.2, 0.5) * F, rng.uniform(0.35, 0.65), 0.0),  # torque, when [of the record]
         DWELL: (rng.uniform(0.5, 1.5), rng.uniform(0.02, 0.1), 0.0),  # share that rest adds, over this time [s]
         BRAKE: (rng.uniform(0.1, 0.3) * F, rng.uniform(8.0, 14.0), 0.0),  # torque per speed beyond this one [rad/s]
+        SHAKEN: (rng.uniform(0.2, 0.5) * F, rng.uniform(12.0, 40.0), rng.uniform(0.0, 6.0)),  # by a neighbour; [Hz]
     }[kind]
 
 
@@ -109,7 +110,7 @@ def _run(reference, kind, axis, q, gusts, loop, out):
                 w_l += dt / (b * J) * T
             elif kind == FAN:
                 other += a * w * w if w > 0.0 else 0.0
-            elif kind == GUSTS:
+            elif kind in (GUSTS, SHAKEN):
                 other += gusts[k]
             elif kind == STEP:
                 other += a if k > b * n else 0.0
@@ -146,6 +147,8 @@ def record(name: str, axis: Axis, seed: int, *, seconds: float = 8.0, stiff: flo
         fade = np.exp(-1.0 / (HZ * q[1]))
         for k in range(1, n):
             gusts[k] = fade * gusts[k - 1] + q[0] * np.sqrt(1.0 - fade**2) * rng.standard_normal()
+    elif kind == SHAKEN:
+        gusts = q[0] * np.sin(2.0 * np.pi * q[1] * t + q[2])
     out = np.empty((3, n))
     _run(reference, kind, (axis.J, axis.F, axis.C, axis.k_t), q, gusts, (40.0, 0.05 * stiff), out)
     theta, w, i = (x + s * rng.standard_normal(n) for x, s in zip(out, axis.noise, strict=True))
