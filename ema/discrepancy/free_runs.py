@@ -7,33 +7,47 @@ what adds up. An effect that stands for something else may make noise likelier a
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import norm, t
 
 from ema.core.records import Array
 
-from .grade import UPPER
-from .held_out import list_parts
+from .parts import list_parts
 from .plant import Plant
 from .selection import Tried, list_folds
 
+FALLIBLE = 0.01  # of what the whitened residual is sure of, as much is wrong (frozen trials, P of 0.95 and more)
 
-def most_borne_out(plant: Plant, before: Tried, model: Tried) -> float:
-    """Most of the motion by which `model` differs from `before` that their free runs on held-out parts may confirm.
+
+def trust_by_free_runs(plant: Plant, before: Tried, model: Tried, trust: float) -> float:
+    """The trust in an effect, which `model` has and `before` has not, when free runs have been heard too.
 
     A cause that moves free runs by d takes d² from the squares of their error: what else is left has nothing to do with
-    it. What stands for something else moves them too, and takes less. The share of d² that is taken, at the upper end
-    of its interval of 95 % by how parts scatter, from 0 to 1; it is 1 where an effect hardly moves free runs, or where
-    there is one part only.
+    it. What stands for something else takes nothing, or adds up to d². Both are held against what was taken on held-out
+    parts, by how these scatter. An effect that hardly moves free runs stays as it was, and they make none surer.
     """
+    odds = min(1.0, float(np.exp(_log_ratio(*_by_part(plant, before, model)))))
+    sure = min(trust, 1.0 - FALLIBLE)
+    return trust * odds / (sure * odds + 1.0 - sure)
+
+
+def _by_part(plant: Plant, before: Tried, model: Tried) -> tuple[Array, Array]:
+    """By how much the square of each part's error falls, and the square by which its runs differ."""
     one, other = _run(plant, before), _run(plant, model)
     parts = [[(one[j], other[j]) for j in sorted(blocks)] for _, _, blocks in list_parts(plant)]
-    moved = np.array([sum(float(np.sum((a - b) ** 2)) for a, b in part) for part in parts])
-    taken = np.array([sum(float(np.sum(a**2) - np.sum(b**2)) for a, b in part) for part in parts])
-    if len(parts) < 2 or not moved.sum() > 0.0:
-        return 1.0
-    error = float(np.std(taken - moved, ddof=1)) * len(parts) ** 0.5
-    deviations = float(t.ppf(norm.cdf(UPPER), len(parts) - 1))  # few parts know their scatter badly
-    return float(np.clip((taken.sum() + deviations * error) / moved.sum(), 0.0, 1.0))
+    taken = [sum(float(np.sum(a**2) - np.sum(b**2)) for a, b in part) for part in parts]
+    moved = [sum(float(np.sum((a - b) ** 2)) for a, b in part) for part in parts]
+    return np.array(taken), np.array(moved)
+
+
+def _log_ratio(taken: Array, moved: Array) -> float:
+    """Log-likelihood that as much was taken as was moved, less that of nothing or of a loss (Student's t).   [nats]"""
+    n = len(taken)
+    scatter = float(np.std(taken - moved, ddof=1)) * n**0.5 if n > 1 else 0.0
+    if scatter == 0.0:
+        return 0.0
+    claimed, found = moved.sum(), taken.sum()
+    deviations = (found - np.array([claimed, np.clip(found, -claimed, 0.0)])) / scatter
+    there, not_there = -0.5 * n * np.log1p(deviations**2 / (n - 1))
+    return float(there - not_there)
 
 
 def _run(plant: Plant, model: Tried) -> dict[int, Array]:

@@ -10,7 +10,7 @@ from scipy.stats import norm
 from .findings import reject
 from .fitting import WILD, Fit
 from .form import looks_like, made_by_form
-from .free_runs import most_borne_out
+from .free_runs import trust_by_free_runs
 from .grade import NAMED
 from .plant import Array, Candidate, Free, Plant
 from .progress import Progress
@@ -93,8 +93,7 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
     The mark of an effect is what the mean square of the held-out residual loses by it. Beside it stand what is left
     unexplained, what only nameless terms explain, and what the other effects' laws may miss by having the wrong form:
     any of them may be what the effect is mistaken for. Of the last, as much as looks like it (`looks_like`), and no
-    more than what is left allows. And an effect that moves something is trusted no further than free runs bear it
-    out.
+    more than what is left allows. What free runs say against an effect that moves something counts too.
     """
     accepted = state.model.accepted
     terms = {k for k, c in enumerate(accepted) if c.is_structure}
@@ -114,7 +113,7 @@ def _trust(plant: Plant, state: State) -> dict[str, float]:
         trust[key] = mark / (mark + unknown + form) if mark > 0.0 else 0.0
     for c in accepted:
         if c.key in trust and not plant.is_of_sensor(c):
-            trust[c.key] *= most_borne_out(plant, befores[c.key], state.model)
+            trust[c.key] = trust_by_free_runs(plant, befores[c.key], state.model, trust[c.key])
         if c.key in trust and _leans(state.model.fits[0], c):
             trust[c.key] *= 0.5
     return trust
