@@ -8,6 +8,7 @@ from toy_plant import N_BLOCKS, N, Toy
 
 from ema.discrepancy import examine
 from ema.discrepancy.free_runs import trust_by_free_runs
+from ema.discrepancy.parts import list_parts
 from ema.discrepancy.selection import fit_base, fit_with_each
 
 SIZE = 0.3
@@ -29,9 +30,13 @@ class Running(Toy):
 
 def trust(plant, before=0.95):
     plain = fit_base(plant)
-    return trust_by_free_runs(
-        plant, plain, fit_with_each(plant, plain, plant.candidates, lambda key: None)["a"], before
-    )
+    model = fit_with_each(plant, plain, plant.candidates, lambda key: None)["a"]
+    return trust_by_free_runs(plant, plain, model, before)
+
+
+def test_parts_hold_every_block_once():
+    blocks = [j for _, _, of in list_parts(Running(0, there=1.0)) for j in of]
+    assert sorted(blocks) == list(range(N_BLOCKS))
 
 
 def test_what_is_there_stays_trusted():
