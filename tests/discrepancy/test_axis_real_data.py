@@ -38,6 +38,7 @@ def strongest_line(outcome):
 
 @pytest.mark.further
 @pytest.mark.slow
+@pytest.mark.timeout(1800)  # the loop's record takes five minutes of a core
 @pytest.mark.parametrize("name", ["standstill", "speed_loop"])
 def test_cogging_of_the_same_order_and_size_is_found_at_standstill_and_in_motion(name):
     outcome = look(name)
