@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .findings import reject
-from .fitting import Fit, fit, jacobian
+from .fitting import Fit, fit, flatten, jacobian
 from .form import FORM
 from .grade import Left, grade
 from .held_out import by_record, over_folds, residual_over_folds, training_errors
@@ -153,12 +153,12 @@ def _without_small_terms(plant: Plant, state: State) -> Left:
 
 def _mimicked(plant: Plant, model: Fit) -> tuple[str, ...]:
     """Effects whose mark on the residual the base parameters could have made: the records cannot show them."""
-    here = np.concatenate([r.ravel() for r in model.residuals])
+    here = flatten(model.residuals)
     slopes, _ = np.linalg.qr(jacobian(plant, plant.base, model.point, model.blocks, here))
     out = []
     for candidate in plant.candidates(model.point, model.blocks):
         points = [{**model.point, **start} for start in candidate.starts[:1]]
-        mark = np.concatenate([r.ravel() for r in plant.residuals(points, model.blocks)[0]]) - here
+        mark = flatten(plant.residuals(points, model.blocks)[0]) - here
         left = mark - slopes @ (slopes.T @ mark)
         if left @ left < MIMICKED * (mark @ mark):
             out.append(candidate.effect)

@@ -11,7 +11,7 @@ import numpy as np
 from ema.core.records import Array
 
 from .engine.posterior import PRIOR, log_odds
-from .fitting import Fit, add_by_noise, best_fit, fit, given_back, log_likelihood, rate, scale_of, slopes
+from .fitting import Fit, add_by_noise, best_fit, fit, flatten, given_back, log_likelihood, rate, scale_of, slopes
 from .plant import Block, Candidate, Plant, Point
 
 N_FOLDS = 2
@@ -62,7 +62,7 @@ class Tried:
     @property
     def rms(self) -> float:
         """Rms of the held-out residual, single wild samples clipped: 1 is noise."""
-        flat = np.concatenate([r.ravel() for r in self.held_out])
+        flat = flatten(self.held_out)
         return float(np.sqrt(np.mean(np.clip(flat, -8 * self.scale, 8 * self.scale) ** 2)))
 
 
@@ -216,7 +216,7 @@ def fit_with_each(
     suggested, frozen = [], []
     for (train, _), fitted in zip(list_folds(plant), model.fits, strict=True):
         suggested.append({c.key: c for c in suggest(fitted.point, train)})
-        rows = np.concatenate([r.ravel() for r in (*fitted.residuals, *fitted.more)])
+        rows = flatten((*fitted.residuals, *fitted.more))
         many = len(fitted.free) > FEW
         frozen.append(slopes(plant, fitted.free, fitted.point, train, rows) if many else None)
     out = {}

@@ -41,6 +41,7 @@ class Axis:
 def sizes(kind: int, axis: Axis, rng: np.random.Generator) -> tuple[float, float, float]:
     """Three numbers of a kind, as `_run` reads them."""
     F = axis.F
+    later = rng.spawn(1)[0]  # a kind that came later leaves what is drawn for the others as it was
     return {
         NOTHING: (0.0, 0.0, 0.0),
         CUSHION: (rng.uniform(5.0, 6.5), rng.uniform(0.2, 0.5) * F, rng.uniform(0.05, 0.2) * F),  # from, linear, square
@@ -57,7 +58,11 @@ def sizes(kind: int, axis: Axis, rng: np.random.Generator) -> tuple[float, float
         STEP: (rng.uniform(0.2, 0.5) * F, rng.uniform(0.35, 0.65), 0.0),  # torque, when [of the record]
         DWELL: (rng.uniform(0.5, 1.5), rng.uniform(0.02, 0.1), 0.0),  # share that rest adds, over this time [s]
         BRAKE: (rng.uniform(0.1, 0.3) * F, rng.uniform(8.0, 14.0), 0.0),  # torque per speed beyond this one [rad/s]
-        SHAKEN: (rng.uniform(0.2, 0.5) * F, rng.uniform(12.0, 40.0), rng.uniform(0.0, 6.0)),  # by a neighbour; [Hz]
+        SHAKEN: (
+            later.uniform(0.2, 0.5) * F,
+            later.uniform(12.0, 40.0),
+            later.uniform(0.0, 6.0),
+        ),  # torque, [Hz], phase
     }[kind]
 
 

@@ -80,7 +80,6 @@ class AxisPlant:
         self.zeros = refine_zeros(self, courses(self), plain_of(plant))
         self._balances: dict[str, Balance | None] = {}
         self.plays: dict[tuple[object, ...], Array | None] = {}  # what `play_candidate` has found
-        self.without_play: set[frozenset[str]] = set()  # effects beside which it has found nothing
 
     @property
     def balance(self) -> Balance | None:

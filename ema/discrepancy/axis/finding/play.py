@@ -46,8 +46,8 @@ def play_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Cand
     if plant.left_by_balance < LEFT * LEFT:  # a load that comes and goes is none of its laws
         return None
     beside = frozenset(key.partition(".")[0] for key in point)
-    if beside in plant.without_play:  # no other part of the records, nor way to take the drive, makes impacts
-        return None
+    if any(x is None for (*_, of), x in plant.plays.items() if of == beside):
+        return None  # no other part of the records, nor way to take the drive, makes impacts
     key = (tuple(blocks), plant.between, beside)
     looked_at = _some(plant, moving)
     start = _started(plant, point, looked_at)
@@ -56,7 +56,6 @@ def play_candidate(plant: Measured, point: Point, blocks: Sequence[int]) -> Cand
         plant.plays[key] = _search(plant, point, start, looked_at, before)
     x = plant.plays[key]
     if x is None:
-        plant.without_play.add(beside)
         return None
     best = start(x)
     F = best.get("F_d", plant.plant.F_d) + best[f"{NAME}.friction"]

@@ -49,8 +49,7 @@ class _Extended:
         self._sensors = plant.model(point)
         self.between, self.benches, self.windows = plant.between, plant.benches, plant.windows
         self.zeros, self.base, self.bench_of, self.residuals = plant.zeros, plant.base, plant.bench_of, plant.residuals
-        self.plays, self.without_play = plant.plays, plant.without_play
-        self.left_by_balance = plant.left_by_balance
+        self.plays, self.left_by_balance = plant.plays, plant.left_by_balance
         pairs = zip(plant.benches, plant.records, strict=True)
         self.records = tuple(replace(r, cycles=tuple(self._undone(b, c) for c in r.cycles)) for b, r in pairs)
 

@@ -45,7 +45,6 @@ class Measured(Protocol):
     windows: tuple[Window, ...]
     zeros: dict[str, Zero]
     plays: dict[tuple[object, ...], Array | None]
-    without_play: set[frozenset[str]]
 
     @property
     def left_by_balance(self) -> float:
